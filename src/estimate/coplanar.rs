@@ -1,0 +1,162 @@
+//! `coplanar`: coverage and centroid of the clipped footprints (Pedersen 2011, eq. 50 to 67).
+//!
+//! The thesis projects the photon along the view ray into the view plane. Here the view footprint is projected the
+//! other way, into the photon's plane and its footprint coordinates: an affine map, so that coverage and centroid are
+//! the same, and the photon's polygon is the same square or regular polygon for all photons. The clipped vertices
+//! carry their parameters in the view footprint along, which maps the centroid back (eq. 66) without an inverse.
+
+use super::{Estimator, Gathered, Lookup, View, weighted_sum};
+use crate::estimate::clip::{self, ClippedPolygon, HalfPlane, MAX_CORNERS, MAX_VERTICES};
+use crate::estimate::kernel::silverman;
+use crate::estimate::polygon::{mean_over_parallelogram, mean_over_part};
+use crate::estimate::settings::{Spec, SpecError};
+use crate::math::rgb::Rgb;
+use crate::photons::MapPhoton;
+use glam::{DVec2, Vec3};
+
+/// How the photon's footprint is drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Shape {
+    /// The parallelogram of its two vectors (eq. 61).
+    Parallelogram,
+    /// A polygon of so many corners on the ellipse (eq. 62).
+    Ellipse(u32),
+}
+
+/// How the part that overlaps is weighed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Weight {
+    /// The kernel at the part's centroid, as published (eq. 67): too bright, and not normalised.
+    Centroid,
+    /// The kernel's mean over the part.
+    Mean,
+}
+
+/// Coplanar intersection-weighted photon differentials.
+pub struct Coplanar {
+    shape: Shape,
+    weight: Weight,
+    planes: Vec<HalfPlane>,
+}
+
+impl Coplanar {
+    /// With that shape and weight.
+    pub fn new(shape: Shape, weight: Weight) -> Self {
+        let planes = match shape {
+            Shape::Parallelogram => clip::square(),
+            Shape::Ellipse(n) => clip::inscribed((n as usize).clamp(3, MAX_CORNERS)),
+        };
+        Self {
+            shape,
+            weight,
+            planes,
+        }
+    }
+
+    /// `coplanar`, with `shape` and `weight`.
+    ///
+    /// # Errors
+    /// An unknown setting or value.
+    pub fn parse(spec: &Spec) -> Result<Box<dyn Estimator>, SpecError> {
+        spec.only(&["shape", "weight"])?;
+        let weight = spec.choice(
+            "weight",
+            Weight::Centroid,
+            &[("centroid", Weight::Centroid), ("mean", Weight::Mean)],
+        )?;
+        let shape = match spec.get("shape") {
+            None | Some("parallelogram") => Shape::Parallelogram,
+            Some("ellipse") => Shape::Ellipse(20),
+            Some(text) => match text.strip_prefix("ellipse:").map(str::parse) {
+                Some(Ok(n)) if (3..=MAX_CORNERS as u32).contains(&n) => Shape::Ellipse(n),
+                _ => {
+                    return Err(spec.error(format!(
+                        "`shape` must be parallelogram or ellipse:N with N in 3 to {MAX_CORNERS}, got `{text}`"
+                    )));
+                }
+            },
+        };
+        Ok(Box::new(Self::new(shape, weight)))
+    }
+
+    fn over_area(&self, photon: &MapPhoton, view: &View) -> f64 {
+        let v = view.direction;
+        let across = photon.normal.dot(v);
+        if across.abs() < 1e-6 {
+            // Seen edge-on the photon covers nothing.
+            return 0.0;
+        }
+        let project = |x: Vec3| {
+            let y = x - v * (photon.normal.dot(x) / across);
+            DVec2::new(f64::from(photon.rows[0].dot(y)), f64::from(photon.rows[1].dot(y)))
+        };
+        let offset = view.query.center - photon.position;
+        let [a, b] = view.query.axes;
+        let (pc, pa, pb) = (project(offset), project(a), project(b));
+        let reach = pa.abs() + pb.abs();
+        if pc.x.abs() - reach.x >= 1.0 || pc.y.abs() - reach.y >= 1.0 {
+            return 0.0;
+        }
+        let mut polygon = ClippedPolygon::whole(pc, pa, pb);
+        for plane in &self.planes {
+            polygon.clip(plane);
+        }
+        let (coverage, centroid) = polygon.coverage_and_centroid();
+        if coverage <= 0.0 {
+            return 0.0;
+        }
+        let filtered = match self.weight {
+            Weight::Centroid => {
+                let x = offset + a * centroid.x as f32 + b * centroid.y as f32;
+                coverage * silverman(f64::from(photon.to_filter(x).length_squared()))
+            }
+            Weight::Mean => {
+                let (fc, fa, fb) = (photon.to_filter(offset), photon.to_filter(a), photon.to_filter(b));
+                let mut parameters = [DVec2::ZERO; MAX_VERTICES];
+                let mut buffer = [DVec2::ZERO; MAX_VERTICES];
+                let vertices = polygon.vertices();
+                for (p, v) in parameters.iter_mut().zip(vertices) {
+                    *p = v.parameter;
+                }
+                let parts = &parameters[..vertices.len()];
+                3.0 * mean_over_part(fc, fa, fb, parts, &mut buffer)
+                    .unwrap_or_else(|| mean_over_parallelogram(fc, fa, fb))
+            }
+        };
+        filtered * f64::from(photon.inverse_area)
+    }
+}
+
+impl Estimator for Coplanar {
+    fn id(&self) -> &'static str {
+        "coplanar"
+    }
+
+    fn settings(&self) -> String {
+        let shape = match self.shape {
+            Shape::Parallelogram => "parallelogram".to_owned(),
+            Shape::Ellipse(n) => format!("ellipse:{n}"),
+        };
+        let weight = match self.weight {
+            Weight::Centroid => "centroid",
+            Weight::Mean => "mean",
+        };
+        format!("shape={shape},weight={weight}")
+    }
+
+    fn lookup(&self) -> Lookup {
+        Lookup::Parallelogram
+    }
+
+    fn is_consistent(&self) -> bool {
+        self.weight == Weight::Mean
+    }
+
+    fn weight(&self, photon: &MapPhoton, view: &View, _radius: f32) -> f64 {
+        self.over_area(photon, view)
+    }
+
+    fn irradiance(&self, gathered: &Gathered, view: &View) -> Rgb {
+        weighted_sum(gathered, |p| self.over_area(p, view))
+    }
+}

@@ -1,0 +1,100 @@
+//! Radiance estimators: one file each, one trait, one registry.
+
+pub mod clip;
+pub mod coplanar;
+pub mod density;
+pub mod integrated;
+pub mod kernel;
+pub mod multi_sampled;
+pub mod polygon;
+pub mod registry;
+pub mod regular;
+pub mod settings;
+
+#[cfg(test)]
+mod energy_tests;
+
+use crate::math::rgb::Rgb;
+use crate::photons::MapPhoton;
+use crate::photons::map::Query;
+use glam::{DVec3, Vec3};
+
+/// A view hit as the estimators see it.
+#[derive(Clone, Copy, Debug)]
+pub struct View {
+    /// Where photons are looked up: hit point, normal and footprint of the view differential.
+    pub query: Query,
+    /// Unit direction of the view ray.
+    pub direction: Vec3,
+}
+
+/// The photons that an estimator looks at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Lookup {
+    /// Those whose ellipsoid holds the hit point.
+    Point,
+    /// Those whose ellipsoid meets the view parallelogram.
+    Parallelogram,
+    /// The k nearest, and the disc that they fill.
+    Disc,
+}
+
+/// Photons gathered from one map for one view hit.
+#[derive(Clone, Copy, Debug)]
+pub struct Gathered<'a> {
+    /// All photons of the map.
+    pub photons: &'a [MapPhoton],
+    /// Those that were found.
+    pub indices: &'a [u32],
+    /// For [`Lookup::Disc`]: radius of the disc, metres. Otherwise 0.
+    pub radius: f32,
+}
+
+/// Turns the photons around one view hit into irradiance.
+pub trait Estimator: Send + Sync {
+    /// Name in the command line, files and titles.
+    fn id(&self) -> &'static str;
+
+    /// Settings that differ from none, as `n=8,grid=closed`; empty if it has none.
+    fn settings(&self) -> String;
+
+    /// Which photons it looks at.
+    fn lookup(&self) -> Lookup;
+
+    /// View rays across and down a pixel.
+    fn rays_per_axis(&self) -> u32 {
+        1
+    }
+
+    /// Whether its progressive render converges under `overlap`.
+    fn is_consistent(&self) -> bool;
+
+    /// Weight of one photon, 1/m²: its kernel's mean over the view footprint, over its area. Finite, not negative.
+    fn weight(&self, photon: &MapPhoton, view: &View, radius: f32) -> f64;
+
+    /// Irradiance, W/m²: the sum of powers times weights.
+    fn irradiance(&self, gathered: &Gathered, view: &View) -> Rgb;
+
+    /// Id and settings, as the command line takes them.
+    fn name(&self) -> String {
+        let settings = self.settings();
+        if settings.is_empty() {
+            self.id().to_owned()
+        } else {
+            format!("{}:{settings}", self.id())
+        }
+    }
+}
+
+/// Sum of the gathered photons' powers times `weight`, in f64; clamped to what f32 can hold.
+fn weighted_sum(gathered: &Gathered, weight: impl Fn(&MapPhoton) -> f64) -> Rgb {
+    let mut sum = DVec3::ZERO;
+    for &i in gathered.indices {
+        let photon = &gathered.photons[i as usize];
+        let w = weight(photon);
+        if w != 0.0 {
+            sum += photon.power.as_dvec3() * w;
+        }
+    }
+    sum.min(DVec3::splat(f64::from(f32::MAX))).as_vec3()
+}

@@ -1,0 +1,3 @@
+//! The `cusp` binary: a thin shell over the library.
+
+fn main() {}

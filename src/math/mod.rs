@@ -1,0 +1,7 @@
+//! Colour, frames, sampling sequences and deterministic elementary functions.
+
+pub mod elementary;
+pub mod frame;
+pub mod hash;
+pub mod rgb;
+pub mod sequence;

@@ -1,0 +1,150 @@
+//! A photon's footprint made ready: its filter transform, area and reach.
+
+use glam::{DVec3, Vec3};
+
+/// The transform from world to filter space, where the photon is the unit disc (Pedersen 2011, eq. 45 corrected).
+#[derive(Clone, Copy, Debug)]
+pub struct FilterTransform {
+    /// Rows of M_pd, 1/metre: filter coordinates are their dot products with `x - x_pd`.
+    pub rows: [Vec3; 3],
+    /// 1/A with `A = π ‖dα × dβ‖`, 1/m² (eq. 40 corrected).
+    pub inverse_area: f32,
+    /// Largest singular value of the footprint, metres: the radius of the ball that holds its ellipsoid.
+    pub reach: f32,
+    /// Half-size of the box around its ellipsoid, metres.
+    pub half_extent: Vec3,
+    /// Whether an axis was raised to the floor.
+    pub floored: bool,
+    /// Whether an axis was lowered to the ceiling.
+    pub capped: bool,
+}
+
+impl FilterTransform {
+    /// Prepares a footprint `(dα, dβ)` on a surface of unit `normal`, its axes times `scale`.
+    ///
+    /// The third column of M⁻¹ is the normal times the longest semi-axis, so that off-plane distance is measured in
+    /// the footprint's own size. Semi-axes below `floor` (metres, the resolution of f32 at this place) are raised to
+    /// it, and those above `ceiling` lowered: a footprint that shrank to a line or a point keeps all its power on
+    /// the smallest ellipse that can be told from it.
+    pub fn new(footprint: [Vec3; 2], normal: Vec3, scale: f32, floor: f32, ceiling: f32) -> Self {
+        let n = normal.as_dvec3();
+        let (floor, ceiling) = (f64::from(floor), f64::from(ceiling));
+        let column = |c: Vec3| {
+            let c = c.as_dvec3() * f64::from(scale);
+            if c.is_finite() { c - n * n.dot(c) } else { DVec3::ZERO }
+        };
+        let (mut a, mut b) = (column(footprint[0]), column(footprint[1]));
+        let principal = Principal::of(a, b, n);
+        let limit = |s: f64| s.clamp(floor, ceiling);
+        let (long, short) = (limit(principal.long), limit(principal.short));
+        let floored = principal.short < floor;
+        let capped = principal.long > ceiling;
+        if floored || capped {
+            // The ellipse alone counts, so any two conjugate half-axes will do.
+            a = principal.axis * long;
+            b = n.cross(principal.axis) * short;
+        }
+        let c = n * long;
+        let det = a.cross(b).dot(c);
+        let rows = [b.cross(c) / det, c.cross(a) / det, a.cross(b) / det];
+        let half = |i: usize| (a[i] * a[i] + b[i] * b[i] + c[i] * c[i]).sqrt() as f32;
+        Self {
+            rows: rows.map(|r| r.as_vec3()),
+            inverse_area: (1.0 / (std::f64::consts::PI * long * short)).min(f64::from(f32::MAX)) as f32,
+            reach: long as f32,
+            half_extent: Vec3::new(half(0), half(1), half(2)),
+            floored,
+            capped,
+        }
+    }
+}
+
+/// Singular values of two vectors in a plane, and the direction of the longer.
+struct Principal {
+    long: f64,
+    short: f64,
+    axis: DVec3,
+}
+
+impl Principal {
+    fn of(a: DVec3, b: DVec3, n: DVec3) -> Self {
+        let (aa, bb, ab) = (a.length_squared(), b.length_squared(), a.dot(b));
+        let half_difference = (aa - bb) / 2.0;
+        let root = (half_difference * half_difference + ab * ab).sqrt();
+        let long = ((aa + bb) / 2.0 + root).sqrt();
+        // The product of the singular values is the determinant, which does not cancel.
+        let short = if long > 0.0 { a.cross(b).length() / long } else { 0.0 };
+        // (cos θ, sin θ) of the right singular vector, from the half angle that does not cancel.
+        let (c, s) = if half_difference >= 0.0 {
+            (half_difference + root, ab)
+        } else {
+            (ab, root - half_difference)
+        };
+        let axis = (a * c + b * s)
+            .try_normalize()
+            .or(a.try_normalize())
+            .unwrap_or_else(|| n.any_orthonormal_vector());
+        Self { long, short, axis }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn filter(t: &FilterTransform, v: Vec3) -> Vec3 {
+        Vec3::new(t.rows[0].dot(v), t.rows[1].dot(v), t.rows[2].dot(v))
+    }
+
+    #[test]
+    fn axes_map_to_unit_vectors() {
+        let (a, b) = (Vec3::new(0.2, 0.0, 0.1), Vec3::new(-0.05, 0.0, 0.3));
+        let t = FilterTransform::new([a, b], Vec3::Y, 2.0, 1e-6, 10.0);
+        assert!((filter(&t, a * 2.0) - Vec3::X).length() < 1e-5);
+        assert!((filter(&t, b * 2.0) - Vec3::Y).length() < 1e-5);
+        assert!((filter(&t, Vec3::Y * t.reach).length() - 1.0).abs() < 1e-5);
+        let area = std::f32::consts::PI * 4.0 * a.cross(b).length();
+        assert!((t.inverse_area * area - 1.0).abs() < 1e-5);
+        assert!(!t.floored && !t.capped);
+    }
+
+    proptest! {
+        /// Aspect ratios to 1e8 and vanishing axes: finite, with the reach and the area of the limited ellipse.
+        #[test]
+        fn degenerate_footprints_have_a_limit(
+            long in -12.0f32..6.0, short in -14.0f32..1.0, turn in 0.0f32..6.3, skew in -3.0f32..3.0,
+        ) {
+            let long = 10f32.powf(long);
+            let short = long * 10f32.powf(short.min(0.0));
+            let (s, c) = turn.sin_cos();
+            let a = Vec3::new(c, 0.0, s) * long;
+            let b = Vec3::new(-s, 0.0, c) * short + a * skew;
+            let t = FilterTransform::new([a, b], Vec3::Y, 1.0, 1e-7, 10.0);
+            prop_assert!(t.rows.iter().all(|r| r.is_finite()) && t.inverse_area.is_finite());
+            prop_assert!(t.reach >= 1e-7 && t.reach <= 10.001);
+            prop_assert!(t.half_extent.max_element() <= t.reach * 1.001);
+            // No point on the ellipse's longest axis lies outside the unit disc.
+            let axis = a * (1.0 + skew * skew).sqrt().recip();
+            let seen = filter(&t, axis.normalize() * t.reach);
+            prop_assert!(seen.is_finite());
+        }
+    }
+
+    #[test]
+    fn singular_values_match_a_closed_form() {
+        // [[1, 1], [0, 1]] has singular values (√5 ± 1)/2.
+        let p = Principal::of(DVec3::X, DVec3::new(1.0, 0.0, 1.0), DVec3::Y);
+        assert!((p.long - (5f64.sqrt() + 1.0) / 2.0).abs() < 1e-12);
+        assert!((p.short - (5f64.sqrt() - 1.0) / 2.0).abs() < 1e-12);
+        let projected = DVec3::X.dot(p.axis).powi(2) + DVec3::new(1.0, 0.0, 1.0).dot(p.axis).powi(2);
+        assert!((projected.sqrt() - p.long).abs() < 1e-12);
+    }
+
+    #[test]
+    fn zero_footprint_keeps_its_power_on_the_floor() {
+        let t = FilterTransform::new([Vec3::ZERO; 2], Vec3::Z, 1.0, 1e-4, 1.0);
+        assert!(t.floored && (t.reach - 1e-4).abs() < 1e-9);
+        assert!((t.inverse_area * std::f32::consts::PI * 1e-8 - 1.0).abs() < 1e-4);
+    }
+}

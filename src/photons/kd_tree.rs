@@ -1,0 +1,252 @@
+//! A kd-tree over photon positions: the k nearest within a radius, with the tests applied inside the search.
+
+use glam::Vec3;
+use std::collections::BinaryHeap;
+
+/// Photons in a leaf, scanned in one go.
+const LEAF: usize = 12;
+
+#[derive(Clone, Copy, Debug)]
+struct Node {
+    /// Where the halves meet.
+    split: f32,
+    /// 0, 1, 2, or [`IS_LEAF`].
+    axis: u32,
+    /// Inner node: index of the right child, the left one follows the node. Leaf: first entry.
+    start: u32,
+    /// Leaf: entries.
+    count: u32,
+}
+
+const IS_LEAF: u32 = 3;
+
+/// A balanced kd-tree; entries are kept as structure of arrays in leaf order.
+#[derive(Clone, Debug, Default)]
+pub struct KdTree {
+    nodes: Vec<Node>,
+    xs: Vec<f32>,
+    ys: Vec<f32>,
+    zs: Vec<f32>,
+    index: Vec<u32>,
+}
+
+/// What to look for.
+#[derive(Clone, Copy, Debug)]
+pub struct NearestQuery {
+    /// Centre, metres.
+    pub center: Vec3,
+    /// Largest distance, metres; may be infinite.
+    pub radius: f32,
+    /// How many, at least one.
+    pub k: usize,
+    /// Unit normal of the slice.
+    pub normal: Vec3,
+    /// Half-height of the slice about the centre's plane, metres; infinite for the whole sphere.
+    pub slice: f32,
+}
+
+/// The photons found so far: the farthest on top.
+///
+/// Distances are squared and kept as the bits of a non-negative f32, whose order is that of the numbers; equal
+/// distances are told apart by index, so that the set found does not depend on the order of the search.
+pub type Nearest = BinaryHeap<(u32, u32)>;
+
+impl KdTree {
+    /// Builds over positions; entry `i` is reported as index `i`.
+    pub fn new(positions: impl Iterator<Item = Vec3>) -> Self {
+        let mut entries: Vec<(Vec3, u32)> = positions.zip(0u32..).collect();
+        let mut tree = Self::default();
+        if !entries.is_empty() {
+            tree.nodes.reserve(2 * entries.len() / LEAF + 1);
+            tree.build(&mut entries);
+        }
+        tree
+    }
+
+    fn build(&mut self, entries: &mut [(Vec3, u32)]) {
+        let node = self.nodes.len();
+        self.nodes.push(Node {
+            split: 0.0,
+            axis: IS_LEAF,
+            start: self.index.len() as u32,
+            count: entries.len() as u32,
+        });
+        if entries.len() <= LEAF {
+            for (p, i) in entries.iter() {
+                self.xs.push(p.x);
+                self.ys.push(p.y);
+                self.zs.push(p.z);
+                self.index.push(*i);
+            }
+            return;
+        }
+        let (low, high) = entries
+            .iter()
+            .fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(l, h), (p, _)| {
+                (l.min(*p), h.max(*p))
+            });
+        let size = high - low;
+        let axis = if size.x >= size.y && size.x >= size.z {
+            0
+        } else if size.y >= size.z {
+            1
+        } else {
+            2
+        };
+        let middle = entries.len() / 2;
+        entries.select_nth_unstable_by(middle, |a, b| {
+            a.0[axis].total_cmp(&b.0[axis]).then(a.1.cmp(&b.1))
+        });
+        let split = entries[middle].0[axis];
+        let (left, right) = entries.split_at_mut(middle);
+        self.build(left);
+        let right_child = self.nodes.len() as u32;
+        self.build(right);
+        self.nodes[node] = Node {
+            split,
+            axis: axis as u32,
+            start: right_child,
+            count: 0,
+        };
+    }
+
+    /// Fills `found` with the `k` nearest entries in the query's sphere and slice that `accept` takes.
+    pub fn nearest(&self, query: &NearestQuery, found: &mut Nearest, accept: impl Fn(u32) -> bool) {
+        found.clear();
+        if self.nodes.is_empty() || query.k == 0 {
+            return;
+        }
+        let center = query.center.to_array();
+        let mut worst = (query.radius * query.radius).min(f32::MAX);
+        // Offsets from the centre to the cell along each axis give the distance to the cell, not only to its plane.
+        let mut stack = [(0u32, 0.0f32, [0.0f32; 3]); 64];
+        let mut top = 1;
+        while top > 0 {
+            top -= 1;
+            let (mut at, distance, offset) = stack[top];
+            if distance > worst {
+                continue;
+            }
+            loop {
+                let node = self.nodes[at as usize];
+                if node.axis == IS_LEAF {
+                    self.scan(node, query, &mut worst, found, &accept);
+                    break;
+                }
+                let axis = node.axis as usize;
+                let d = center[axis] - node.split;
+                let (near, far) = if d < 0.0 { (at + 1, node.start) } else { (node.start, at + 1) };
+                let beyond = distance - offset[axis] * offset[axis] + d * d;
+                if beyond <= worst {
+                    let mut far_offset = offset;
+                    far_offset[axis] = d;
+                    stack[top] = (far, beyond.max(0.0), far_offset);
+                    top += 1;
+                }
+                // The near side keeps the cell's distance; only going across changes it.
+                at = near;
+            }
+        }
+    }
+
+    #[inline]
+    fn scan(
+        &self,
+        node: Node,
+        query: &NearestQuery,
+        worst: &mut f32,
+        found: &mut Nearest,
+        accept: &impl Fn(u32) -> bool,
+    ) {
+        let range = node.start as usize..(node.start + node.count) as usize;
+        let (xs, ys, zs) = (&self.xs[range.clone()], &self.ys[range.clone()], &self.zs[range.clone()]);
+        let mut squared = [0.0f32; LEAF];
+        for i in 0..xs.len() {
+            let (x, y, z) = (xs[i] - query.center.x, ys[i] - query.center.y, zs[i] - query.center.z);
+            squared[i] = x * x + y * y + z * z;
+        }
+        for i in 0..xs.len() {
+            if squared[i] > *worst {
+                continue;
+            }
+            let offset = Vec3::new(xs[i], ys[i], zs[i]) - query.center;
+            let index = self.index[range.start + i];
+            if offset.dot(query.normal).abs() > query.slice || !accept(index) {
+                continue;
+            }
+            let entry = (squared[i].to_bits(), index);
+            if found.len() < query.k {
+                found.push(entry);
+            } else if let Some(mut farthest) = found.peek_mut()
+                && entry < *farthest
+            {
+                *farthest = entry;
+            }
+            if found.len() == query.k
+                && let Some(farthest) = found.peek()
+            {
+                *worst = worst.min(f32::from_bits(farthest.0));
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::sequence::{Sampling, Sequence};
+
+    fn brute(points: &[Vec3], q: &NearestQuery, accept: impl Fn(u32) -> bool) -> Vec<(u32, u32)> {
+        let mut all: Vec<(u32, u32)> = points
+            .iter()
+            .zip(0u32..)
+            .filter(|(p, i)| {
+                let o = **p - q.center;
+                o.x * o.x + o.y * o.y + o.z * o.z <= q.radius * q.radius
+                    && o.dot(q.normal).abs() <= q.slice
+                    && accept(*i)
+            })
+            .map(|(p, i)| {
+                let o = *p - q.center;
+                ((o.x * o.x + o.y * o.y + o.z * o.z).to_bits(), i)
+            })
+            .collect();
+        all.sort_unstable();
+        all.truncate(q.k);
+        all
+    }
+
+    #[test]
+    fn finds_what_brute_force_finds() {
+        let sequence = Sequence::new(Sampling::Random, 3);
+        let clouds: [fn([f32; 4]) -> Vec3; 4] = [
+            |x| Vec3::new(x[0], x[1], x[2]),
+            |x| Vec3::new(x[0], 0.5, x[2]),
+            |x| Vec3::new(0.3, 0.5, (x[2] * 8.0).floor() / 8.0),
+            |_| Vec3::splat(0.5),
+        ];
+        for (c, cloud) in clouds.into_iter().enumerate() {
+            for n in [0usize, 1, 2, 13, 1000] {
+                let points: Vec<Vec3> = (0..n).map(|i| cloud(sequence.four(i as u64, c as u32))).collect();
+                let tree = KdTree::new(points.iter().copied());
+                let mut found = Nearest::new();
+                for q in 0..60u64 {
+                    let x = sequence.four(q, 100);
+                    let y = sequence.four(q, 101);
+                    let query = NearestQuery {
+                        center: Vec3::new(x[0], x[1], x[2]),
+                        radius: [0.05, 0.3, f32::INFINITY][q as usize % 3],
+                        k: [1, 7, 50, 2000][q as usize % 4],
+                        normal: crate::math::frame::uniform_sphere(y[0], y[1]),
+                        slice: if q % 2 == 0 { f32::INFINITY } else { 0.1 },
+                    };
+                    let accept = |i: u32| q % 5 != 0 || i % 3 != 0;
+                    tree.nearest(&query, &mut found, accept);
+                    let mut got = found.clone().into_vec();
+                    got.sort_unstable();
+                    assert_eq!(got, brute(&points, &query, accept), "cloud {c}, n {n}, query {q}");
+                }
+            }
+        }
+    }
+}

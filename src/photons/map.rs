@@ -1,0 +1,375 @@
+//! Photon maps: photons made ready for a footprint scale, with the structures that look them up.
+
+use crate::math::rgb::Rgb;
+use crate::photons::Photon;
+use crate::photons::footprint::FilterTransform;
+use crate::photons::kd_tree::{KdTree, Nearest, NearestQuery};
+use crate::photons::overlap::OverlapTree;
+use glam::Vec3;
+use rayon::prelude::*;
+
+/// Smallest cosine between the normals of a photon's surface and the view hit's for the photon to count.
+///
+/// Keeps photons of the far side of an edge out of a hit, and lets a smooth surface bend within a footprint.
+pub const NORMAL_AGREEMENT: f32 = 0.5;
+
+/// A photon of a map, ready to be evaluated.
+#[derive(Clone, Copy, Debug)]
+pub struct MapPhoton {
+    /// Where it arrived, metres.
+    pub position: Vec3,
+    /// 1/A, 1/m².
+    pub inverse_area: f32,
+    /// Rows of the filter transform M_pd, 1/metre.
+    pub rows: [Vec3; 3],
+    /// Largest semi-axis, metres.
+    pub reach: f32,
+    /// Power, W.
+    pub power: Rgb,
+    /// Unit normal of its surface.
+    pub normal: Vec3,
+    /// Unit direction in which it travelled.
+    pub direction: Vec3,
+}
+
+impl MapPhoton {
+    /// Filter coordinates of a world vector.
+    #[inline]
+    pub fn to_filter(&self, v: Vec3) -> Vec3 {
+        Vec3::new(self.rows[0].dot(v), self.rows[1].dot(v), self.rows[2].dot(v))
+    }
+
+    /// Whether it lights the side of a surface that has this unit normal.
+    #[inline]
+    pub fn lights(&self, normal: Vec3) -> bool {
+        self.normal.dot(normal) >= NORMAL_AGREEMENT && self.direction.dot(normal) < 0.0
+    }
+}
+
+/// Which structures a map needs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct MapParts {
+    /// The kd-tree, for the k nearest.
+    pub kd_tree: bool,
+    /// The footprint hierarchy, for overlap.
+    pub overlap: bool,
+}
+
+/// Limits on footprints and the factor on their axes.
+#[derive(Clone, Copy, Debug)]
+pub struct FootprintLimits {
+    /// Factor on both axes.
+    pub scale: f32,
+    /// Smallest semi-axis, metres, positive.
+    pub floor: f32,
+    /// Largest semi-axis, metres.
+    pub ceiling: f32,
+}
+
+/// The photons of one kind in one pass.
+pub struct PhotonMap {
+    photons: Vec<MapPhoton>,
+    kd_tree: Option<KdTree>,
+    overlap: Option<OverlapTree>,
+    longest_reach: f32,
+    floored: u64,
+    capped: u64,
+}
+
+/// A place where photons are looked up.
+#[derive(Clone, Copy, Debug)]
+pub struct Query {
+    /// Centre, metres.
+    pub center: Vec3,
+    /// Unit normal of the surface, on the side that is seen.
+    pub normal: Vec3,
+    /// Half-edges of the view parallelogram, metres; zero for a point.
+    pub axes: [Vec3; 2],
+}
+
+impl PhotonMap {
+    /// Prepares photons; the same photons give the same map.
+    pub fn new(photons: &[Photon], limits: FootprintLimits, parts: MapParts) -> Self {
+        let prepared: Vec<(MapPhoton, FilterTransform)> = photons
+            .par_iter()
+            .map(|p| {
+                let t = FilterTransform::new(p.footprint, p.normal, limits.scale, limits.floor, limits.ceiling);
+                let photon = MapPhoton {
+                    position: p.position,
+                    inverse_area: t.inverse_area,
+                    rows: t.rows,
+                    reach: t.reach,
+                    power: p.power,
+                    normal: p.normal,
+                    direction: p.direction,
+                };
+                (photon, t)
+            })
+            .collect();
+        let count = |f: fn(&FilterTransform) -> bool| prepared.iter().filter(|(_, t)| f(t)).count() as u64;
+        let (floored, capped) = (count(|t| t.floored), count(|t| t.capped));
+        let longest_reach = prepared.iter().fold(0.0f32, |m, (_, t)| m.max(t.reach));
+        let (overlap, photons) = if parts.overlap {
+            let (tree, order) = OverlapTree::new(prepared.iter().map(|(p, t)| (p.position, t.half_extent)));
+            // In the hierarchy's order, so that a leaf is a range of photons.
+            (Some(tree), order.iter().map(|&i| prepared[i as usize].0).collect())
+        } else {
+            (None, prepared.iter().map(|(p, _)| *p).collect::<Vec<_>>())
+        };
+        let kd_tree = parts
+            .kd_tree
+            .then(|| KdTree::new(photons.iter().map(|p| p.position)));
+        Self {
+            photons,
+            kd_tree,
+            overlap,
+            longest_reach,
+            floored,
+            capped,
+        }
+    }
+
+    /// The photons, in the map's order.
+    pub fn photons(&self) -> &[MapPhoton] {
+        &self.photons
+    }
+
+    /// Footprints raised to the floor and lowered to the ceiling.
+    pub fn limited(&self) -> (u64, u64) {
+        (self.floored, self.capped)
+    }
+
+    /// Appends to `out` the `k` photons nearest to the query's centre whose ball can reach its footprint:
+    /// the radii of both add up before they are squared.
+    ///
+    /// Nothing is found in a map without kd-tree.
+    pub fn nearest(&self, query: &Query, k: usize, heap: &mut Nearest, out: &mut Vec<u32>) {
+        let [a, b] = query.axes;
+        let view_radius = (a + b).length().max((a - b).length());
+        self.nearest_within(query, k, view_radius + self.longest_reach, heap);
+        out.extend(heap.iter().map(|(_, i)| *i));
+    }
+
+    /// Leaves in `heap` the `k` photons nearest to the query's centre within `radius` metres.
+    pub fn nearest_within(&self, query: &Query, k: usize, radius: f32, heap: &mut Nearest) {
+        heap.clear();
+        let Some(tree) = &self.kd_tree else { return };
+        let nearest = NearestQuery {
+            center: query.center,
+            radius,
+            k,
+            normal: query.normal,
+            // Beyond its longest axis a footprint has no weight above its plane.
+            slice: if radius.is_finite() { self.longest_reach.max(radius) } else { f32::INFINITY },
+        };
+        tree.nearest(&nearest, heap, |i| self.photons[i as usize].lights(query.normal));
+    }
+
+    /// Appends to `out` exactly the photons whose ellipsoid meets the query's point.
+    ///
+    /// Nothing is found in a map without footprint hierarchy.
+    pub fn overlapping_point(&self, query: &Query, out: &mut Vec<u32>) {
+        let Some(tree) = &self.overlap else { return };
+        tree.at_point(query.center, |range| {
+            for i in range {
+                let p = &self.photons[i as usize];
+                if p.to_filter(query.center - p.position).length_squared() < 1.0 && p.lights(query.normal) {
+                    out.push(i);
+                }
+            }
+        });
+    }
+
+    /// Appends to `out` exactly the photons whose ellipsoid meets the query's parallelogram.
+    ///
+    /// Nothing is found in a map without footprint hierarchy.
+    pub fn overlapping_parallelogram(&self, query: &Query, out: &mut Vec<u32>) {
+        let Some(tree) = &self.overlap else { return };
+        let [a, b] = query.axes;
+        tree.in_box(query.center, a.abs() + b.abs(), |range| {
+            for i in range {
+                let p = &self.photons[i as usize];
+                if p.lights(query.normal) && meets_unit_ball(p, query) {
+                    out.push(i);
+                }
+            }
+        });
+    }
+}
+
+/// Whether the query's parallelogram comes nearer than 1 to the photon in filter space.
+fn meets_unit_ball(p: &MapPhoton, query: &Query) -> bool {
+    let c = p.to_filter(query.center - p.position);
+    let cc = c.length_squared();
+    if cc < 1.0 {
+        return true;
+    }
+    let [a, b] = query.axes.map(|v| p.to_filter(v));
+    let (aa, bb) = (a.length_squared(), b.length_squared());
+    let reach = 1.0 + aa.sqrt() + bb.sqrt();
+    if cc >= reach * reach {
+        return false;
+    }
+    nearest_on_parallelogram(c, a, b) < 1.0
+}
+
+/// Squared distance of the parallelogram `c + s a + t b`, `|s|, |t| ≤ 1`, from the origin.
+fn nearest_on_parallelogram(c: Vec3, a: Vec3, b: Vec3) -> f32 {
+    let (c, a, b) = (c.as_dvec3(), a.as_dvec3(), b.as_dvec3());
+    let (aa, bb, ab) = (a.length_squared(), b.length_squared(), a.dot(b));
+    let (ca, cb) = (c.dot(a), c.dot(b));
+    let det = aa * bb - ab * ab;
+    if det > 0.0 {
+        let (s, t) = ((cb * ab - ca * bb) / det, (ca * ab - cb * aa) / det);
+        if s.abs() <= 1.0 && t.abs() <= 1.0 {
+            return (c + a * s + b * t).length_squared() as f32;
+        }
+    }
+    let along = |from: glam::DVec3, edge: glam::DVec3, squared: f64| {
+        let s = if squared > 0.0 { (-from.dot(edge) / squared).clamp(-1.0, 1.0) } else { 0.0 };
+        (from + edge * s).length_squared()
+    };
+    let nearest = along(c - b, a, aa)
+        .min(along(c + b, a, aa))
+        .min(along(c - a, b, bb))
+        .min(along(c + a, b, bb));
+    nearest as f32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::frame::{tangents, uniform_sphere};
+    use crate::math::sequence::{Sampling, Sequence};
+
+    const LIMITS: FootprintLimits = FootprintLimits {
+        scale: 1.0,
+        floor: 1e-6,
+        ceiling: 10.0,
+    };
+
+    fn random_photons(n: u64) -> Vec<Photon> {
+        let sequence = Sequence::new(Sampling::Random, 8);
+        (0..n)
+            .map(|i| {
+                let (x, y, z) = (sequence.four(i, 0), sequence.four(i, 1), sequence.four(i, 2));
+                let normal = if i % 3 == 0 { Vec3::Y } else { uniform_sphere(y[0], y[1]).normalize() };
+                let (t, b) = tangents(normal);
+                let size = 0.3 * y[2] * y[2];
+                Photon {
+                    position: Vec3::new(x[0], x[1] * 0.2, x[2]),
+                    direction: -normal,
+                    normal,
+                    power: Rgb::ONE,
+                    footprint: [t * size + b * (size * z[0]), b * (size * z[1]) - t * (size * z[2])],
+                }
+            })
+            .collect()
+    }
+
+    fn queries(n: u64) -> impl Iterator<Item = Query> {
+        let sequence = Sequence::new(Sampling::Random, 9);
+        (0..n).map(move |i| {
+            let (x, y) = (sequence.four(i, 0), sequence.four(i, 1));
+            let normal = if i % 2 == 0 { Vec3::Y } else { uniform_sphere(y[0], y[1]).normalize() };
+            let (t, b) = tangents(normal);
+            let size = 0.2 * y[2];
+            Query {
+                center: Vec3::new(x[0], x[1] * 0.2, x[2]),
+                normal,
+                axes: [t * size, (b + t * y[3]) * (size * x[3])],
+            }
+        })
+    }
+
+    /// The overlap structure returns exactly what brute force over all photons returns.
+    #[test]
+    fn overlap_is_exact() {
+        let photons = random_photons(700);
+        let map = PhotonMap::new(&photons, LIMITS, MapParts { kd_tree: false, overlap: true });
+        let mut found = Vec::new();
+        let mut total = 0;
+        for q in queries(300) {
+            for point in [true, false] {
+                let q = if point { Query { axes: [Vec3::ZERO; 2], ..q } } else { q };
+                found.clear();
+                if point {
+                    map.overlapping_point(&q, &mut found);
+                } else {
+                    map.overlapping_parallelogram(&q, &mut found);
+                }
+                found.sort_unstable();
+                // A fine grid over the parallelogram in f64, away from the boundary by the grid's own spacing.
+                let brute: Vec<(u32, f64)> = map
+                    .photons()
+                    .iter()
+                    .zip(0u32..)
+                    .filter(|(p, _)| p.lights(q.normal))
+                    .map(|(p, i)| {
+                        let n = if point { 0 } else { 60 };
+                        let mut least = f64::INFINITY;
+                        for s in 0..=n {
+                            for t in 0..=n {
+                                let at = |k: i32| if n == 0 { 0.0 } else { f64::from(k) / f64::from(n) * 2.0 - 1.0 };
+                                let x = q.center.as_dvec3() + q.axes[0].as_dvec3() * at(s) + q.axes[1].as_dvec3() * at(t)
+                                    - p.position.as_dvec3();
+                                let f = p.rows.map(|r| r.as_dvec3().dot(x));
+                                least = least.min(f[0] * f[0] + f[1] * f[1] + f[2] * f[2]);
+                            }
+                        }
+                        (i, least)
+                    })
+                    .collect();
+                for (i, d2) in brute {
+                    let inside = found.binary_search(&i).is_ok();
+                    if d2 < 0.9999 {
+                        assert!(inside, "photon {i} at {d2} missed");
+                    }
+                    let step = if point {
+                        0.0
+                    } else {
+                        let p = &map.photons()[i as usize];
+                        q.axes.iter().map(|a| f64::from(p.to_filter(*a).length()) / 60.0).sum()
+                    };
+                    if d2.sqrt() > 1.0001 + step {
+                        assert!(!inside, "photon {i} at {d2} should not be there");
+                    }
+                    total += usize::from(inside);
+                }
+            }
+        }
+        assert!(total > 2000, "{total}");
+    }
+
+    /// With k above the map's size `knn` finds every photon that overlaps.
+    #[test]
+    fn nearest_with_a_large_k_contains_the_overlap() {
+        let photons = random_photons(500);
+        let map = PhotonMap::new(&photons, LIMITS, MapParts { kd_tree: true, overlap: true });
+        let mut heap = Nearest::new();
+        for q in queries(200) {
+            let (mut by_k, mut by_overlap) = (Vec::new(), Vec::new());
+            map.nearest(&q, 10_000, &mut heap, &mut by_k);
+            map.overlapping_parallelogram(&q, &mut by_overlap);
+            by_k.sort_unstable();
+            for i in by_overlap {
+                assert!(by_k.binary_search(&i).is_ok());
+            }
+        }
+    }
+
+    #[test]
+    fn empty_and_single_maps_work() {
+        for n in [0, 1, 2] {
+            let map = PhotonMap::new(&random_photons(n), LIMITS, MapParts { kd_tree: true, overlap: true });
+            let mut heap = Nearest::new();
+            for q in queries(20) {
+                let mut out = Vec::new();
+                map.nearest(&q, 5, &mut heap, &mut out);
+                map.overlapping_point(&q, &mut out);
+                map.overlapping_parallelogram(&q, &mut out);
+                assert!(out.iter().all(|&i| u64::from(i) < n));
+            }
+        }
+    }
+}

@@ -1,0 +1,13 @@
+//! Photons: emission, paths, storage, and the maps that look them up.
+
+pub mod emission;
+pub mod footprint;
+pub mod kd_tree;
+pub mod map;
+pub mod overlap;
+pub mod path;
+pub mod photon;
+pub mod spread;
+
+pub use map::{MapPhoton, PhotonMap};
+pub use photon::{Photon, PhotonKind, StoredPhotons};

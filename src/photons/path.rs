@@ -1,0 +1,261 @@
+//! A photon's path from its light to its end, and what is stored on the way.
+
+use crate::math::elementary::pow;
+use crate::math::frame::cosine_hemisphere;
+use crate::math::rgb::{Rgb, mean};
+use crate::math::sequence::Sequence;
+use crate::photons::emission::Emission;
+use crate::photons::spread::{self, DiffuseSpread};
+use crate::photons::{Photon, PhotonKind, StoredPhotons};
+use crate::scene::{Material, Scene};
+use crate::trace::scatter::{reflected, refracted, specular_weights};
+use crate::trace::{Differential, Intersector, Ray, Surface};
+use serde::Serialize;
+use std::ops::AddAssign;
+
+/// Largest change of direction over a footprint, beyond which a linear differential means nothing.
+pub const MAX_ANGLE: f32 = 10.0;
+
+/// Which photons are kept, and how paths are followed.
+#[derive(Clone, Copy, Debug)]
+pub struct PathSettings {
+    /// Surfaces that a path may meet.
+    pub max_depth: u32,
+    /// Keep direct photons.
+    pub direct: bool,
+    /// Keep caustic photons.
+    pub caustic: bool,
+    /// Keep global photons: paths go on after a diffuse bounce.
+    pub global: bool,
+    /// Carry differentials; without them footprints are zero.
+    pub differentials: bool,
+    /// Rule for diffuse bounces.
+    pub spread: DiffuseSpread,
+}
+
+/// Counts of what was bounded or cut off.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct PathCounts {
+    /// Differentials shortened to the scene's size or to [`MAX_ANGLE`].
+    pub differentials: u64,
+    /// Solid angles bounded at grazing emission or reflection.
+    pub grazing: u64,
+    /// Specular rays that a shading normal sent beyond the horizon.
+    pub horizon: u64,
+    /// Paths ended by the bounce limit.
+    pub depth: u64,
+}
+
+impl AddAssign for PathCounts {
+    fn add_assign(&mut self, o: Self) {
+        self.differentials += o.differentials;
+        self.grazing += o.grazing;
+        self.horizon += o.horizon;
+        self.depth += o.depth;
+    }
+}
+
+/// A photon on its way.
+pub struct Flight<'a> {
+    /// The scene.
+    pub scene: &'a Scene,
+    /// Its intersector.
+    pub intersector: &'a Intersector,
+    /// How to follow paths.
+    pub settings: PathSettings,
+    /// Numbers of the pass: set 0 is emission's, set `1 + b` bounce `b`'s.
+    pub sequence: Sequence,
+}
+
+impl Flight<'_> {
+    /// Follows one photon of `count` from its `emission` and appends what is stored to `out`.
+    ///
+    /// Russian roulette keeps the mean power over channels (Pedersen 2011, section 2.1.2); colours shift it between
+    /// channels. `index` names the photon in the sequence.
+    pub fn trace(
+        &self,
+        index: u64,
+        emission: &Emission,
+        power: Rgb,
+        count: u64,
+        out: &mut StoredPhotons,
+        counts: &mut PathCounts,
+    ) {
+        let scene = self.scene;
+        let mut ray = Ray {
+            origin: emission.origin,
+            direction: emission.direction,
+        };
+        let mut d = emission.differential;
+        let mut power = power;
+        let mut kind = PhotonKind::Direct;
+        counts.grazing += u64::from(emission.bounded);
+        for bounce in 0..self.settings.max_depth {
+            let Some(hit) = self.intersector.closest(&ray) else {
+                return;
+            };
+            let surface = Surface::new(scene, &ray, &hit);
+            let v = ray.direction;
+            if self.settings.differentials {
+                d = d.transfer(v, surface.normal, hit.t);
+                counts.differentials += u64::from(d.bound(scene.radius, MAX_ANGLE));
+            }
+            let x = self.sequence.four(index, 1 + bounce);
+            let material = &scene.materials[surface.material as usize];
+            match material {
+                Material::Emitter { .. } => return,
+                Material::Diffuse { .. } => {
+                    if self.keeps(kind) {
+                        out.of_mut(kind).push(Photon {
+                            position: surface.position,
+                            direction: v,
+                            normal: surface.normal,
+                            power,
+                            footprint: d.dp,
+                        });
+                    }
+                    if !self.settings.global {
+                        return;
+                    }
+                    let reflectance = material.diffuse_reflectance(surface.uv);
+                    let Some(kept) = roulette(power, reflectance, x[0]) else {
+                        return;
+                    };
+                    power = kept;
+                    kind = PhotonKind::Global;
+                    let w = cosine_hemisphere(surface.normal, x[2], x[3]);
+                    if self.settings.differentials {
+                        let cos = w.dot(surface.normal);
+                        let (next, bounded) =
+                            spread::bounce(self.settings.spread, &d, v, w, cos, count);
+                        d = next;
+                        counts.grazing += u64::from(bounded);
+                    }
+                    ray = Ray {
+                        origin: surface.leave(scene, w),
+                        direction: w,
+                    };
+                }
+                _ => {
+                    let Some((next, kept, beyond)) =
+                        self.specular(material, &surface, &ray, hit.t, power, &mut d, x)
+                    else {
+                        return;
+                    };
+                    power = kept;
+                    ray = next;
+                    counts.horizon += u64::from(beyond);
+                    if kind == PhotonKind::Direct {
+                        kind = PhotonKind::Caustic;
+                    }
+                }
+            }
+        }
+        counts.depth += 1;
+    }
+
+    fn keeps(&self, kind: PhotonKind) -> bool {
+        match kind {
+            PhotonKind::Direct => self.settings.direct,
+            PhotonKind::Caustic => self.settings.caustic,
+            PhotonKind::Global => self.settings.global,
+        }
+    }
+
+    /// One specular event by roulette: the next ray, the power it keeps, whether its normal was mended.
+    #[expect(clippy::too_many_arguments, reason = "the state of a path, spelled out")]
+    fn specular(
+        &self,
+        material: &Material,
+        surface: &Surface,
+        ray: &Ray,
+        distance: f32,
+        power: Rgb,
+        d: &mut Differential,
+        x: [f32; 4],
+    ) -> Option<(Ray, Rgb, bool)> {
+        let weights = specular_weights(material, surface, ray.direction)?;
+        let mut power = power;
+        if let Some(inside) = attenuation(material, surface, distance) {
+            power = roulette(power, inside, x[2])?;
+        }
+        let reflect = share(power, weights.reflected);
+        let refract = share(power, weights.refracted);
+        let (next, weight, q) = if x[0] < reflect {
+            (reflected(self.scene, surface, ray.direction, d), weights.reflected, reflect)
+        } else if x[0] < reflect + refract {
+            (
+                refracted(self.scene, surface, ray.direction, d, weights.eta),
+                weights.refracted,
+                refract,
+            )
+        } else {
+            return None;
+        };
+        if self.settings.differentials {
+            *d = next.differential;
+        }
+        let ray = Ray {
+            origin: surface.leave(self.scene, next.direction),
+            direction: next.direction,
+        };
+        Some((ray, power * weight / q, next.beyond_horizon))
+    }
+}
+
+/// Transmittance of the way just travelled, if it lay inside a dielectric that absorbs.
+pub fn attenuation(material: &Material, surface: &Surface, distance: f32) -> Option<Rgb> {
+    match material {
+        Material::Dielectric { transmittance, .. }
+            if !surface.front && *transmittance != Rgb::ONE =>
+        {
+            Some(Rgb::from_array(
+                transmittance.to_array().map(|t| pow(t, distance)),
+            ))
+        }
+        _ => None,
+    }
+}
+
+/// Share of `power` that `weight` lets through, by the mean of the channels.
+fn share(power: Rgb, weight: Rgb) -> f32 {
+    let whole = mean(power);
+    if whole > 0.0 {
+        (mean(power * weight) / whole).clamp(0.0, 1.0)
+    } else {
+        0.0
+    }
+}
+
+/// The power that survives `weight` for the number `x` in `[0, 1)`, its mean unchanged; None if it does not survive.
+fn roulette(power: Rgb, weight: Rgb, x: f32) -> Option<Rgb> {
+    let q = share(power, weight);
+    (x < q).then(|| power * weight / q)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn roulette_keeps_the_mean_power(
+            p in prop::array::uniform3(0.01f32..10.0), w in prop::array::uniform3(0.0f32..1.0),
+        ) {
+            let (p, w) = (Rgb::from(p), Rgb::from(w));
+            if let Some(kept) = roulette(p, w, 0.0) {
+                prop_assert!((mean(kept) / mean(p) - 1.0).abs() < 1e-5);
+                // What survives, times how often, is what the weight lets through.
+                prop_assert!((kept * share(p, w) - p * w).abs().max_element() < 1e-5 * mean(p));
+            }
+        }
+    }
+
+    #[test]
+    fn black_absorbs_and_white_keeps() {
+        assert!(roulette(Rgb::ONE, Rgb::ZERO, 0.0).is_none());
+        assert_eq!(roulette(Rgb::ONE, Rgb::ONE, 0.999_999), Some(Rgb::ONE));
+        assert!(roulette(Rgb::ZERO, Rgb::ONE, 0.0).is_none());
+    }
+}

@@ -1,0 +1,82 @@
+//! Surfaces as the intersector sees them: indexed triangles and spheres.
+
+use glam::{Vec2, Vec3};
+
+/// No shading normal or texture coordinate at a corner.
+pub const NONE: u32 = u32::MAX;
+
+/// A sphere with its surface.
+#[derive(Clone, Copy, Debug)]
+pub struct Sphere {
+    /// Centre, metres.
+    pub center: Vec3,
+    /// Radius, metres, positive.
+    pub radius: f32,
+    /// Index of its material.
+    pub material: u32,
+}
+
+/// Triangles and spheres. Primitive `i` is triangle `i`, or sphere `i - triangles` beyond them.
+#[derive(Clone, Debug, Default)]
+pub struct Geometry {
+    /// Vertices, metres.
+    pub positions: Vec<Vec3>,
+    /// Unit shading normals.
+    pub normals: Vec<Vec3>,
+    /// Texture coordinates.
+    pub uvs: Vec<Vec2>,
+    /// Vertices of each triangle, counter-clockwise seen from the front.
+    pub triangles: Vec<[u32; 3]>,
+    /// Shading normals of each triangle's corners; [`NONE`] where it is flat.
+    pub corner_normals: Vec<[u32; 3]>,
+    /// Texture coordinates of each triangle's corners; [`NONE`] where there are none.
+    pub corner_uvs: Vec<[u32; 3]>,
+    /// Material of each triangle.
+    pub triangle_materials: Vec<u32>,
+    /// Spheres.
+    pub spheres: Vec<Sphere>,
+    /// Triangles of the input without area, left out.
+    pub zero_area: usize,
+}
+
+impl Geometry {
+    /// Corners of a triangle.
+    pub fn corners(&self, triangle: usize) -> [Vec3; 3] {
+        self.triangles[triangle].map(|i| self.positions[i as usize])
+    }
+
+    /// Number of triangles and spheres.
+    pub fn primitive_count(&self) -> usize {
+        self.triangles.len() + self.spheres.len()
+    }
+
+    /// Index of the material of a primitive.
+    pub fn material(&self, primitive: usize) -> usize {
+        match self.triangle_materials.get(primitive) {
+            Some(m) => *m as usize,
+            None => self.spheres[primitive - self.triangles.len()].material as usize,
+        }
+    }
+
+    /// Corners of the box around a primitive.
+    pub fn bounds(&self, primitive: usize) -> (Vec3, Vec3) {
+        if primitive < self.triangles.len() {
+            let [a, b, c] = self.corners(primitive);
+            (a.min(b).min(c), a.max(b).max(c))
+        } else {
+            let s = self.spheres[primitive - self.triangles.len()];
+            (s.center - s.radius, s.center + s.radius)
+        }
+    }
+
+    /// Indices of the materials that some surface has; an index may come more than once.
+    pub fn used_materials(&self) -> impl Iterator<Item = usize> + '_ {
+        let mut last = NONE;
+        self.triangle_materials
+            .iter()
+            .copied()
+            .chain(self.spheres.iter().map(|s| s.material))
+            .filter(move |&m| std::mem::replace(&mut last, m) != m)
+            .map(|m| m as usize)
+    }
+}

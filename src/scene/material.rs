@@ -1,0 +1,69 @@
+//! What surfaces do with light.
+
+use crate::math::rgb::Rgb;
+use crate::scene::texture::Texture;
+use glam::Vec2;
+use std::sync::Arc;
+
+/// A surface's material. Reflectances lie in `[0, 1]`.
+#[derive(Clone, Debug)]
+pub enum Material {
+    /// Lambertian reflection.
+    Diffuse {
+        /// Reflectance ρ.
+        reflectance: Rgb,
+        /// Multiplies the reflectance.
+        texture: Option<Arc<Texture>>,
+    },
+    /// Perfect reflection from both sides, the same at every angle.
+    Mirror {
+        /// Reflectance.
+        reflectance: Rgb,
+    },
+    /// Perfect reflection from both sides with Schlick's Fresnel term (Schlick 1994).
+    Metal {
+        /// Reflectance at normal incidence.
+        reflectance: Rgb,
+    },
+    /// A smooth boundary to a medium; the front side is outside.
+    Dielectric {
+        /// Refractive index against the outside, at least 1.
+        ior: f32,
+        /// Transmittance per metre inside, per channel.
+        transmittance: Rgb,
+    },
+    /// A light's surface: black to light that arrives, radiant on its front side.
+    Emitter {
+        /// Radiance, W/(m² sr).
+        radiance: Rgb,
+    },
+}
+
+impl Material {
+    /// Whether light leaves in at most two directions.
+    pub fn is_specular(&self) -> bool {
+        matches!(
+            self,
+            Self::Mirror { .. } | Self::Metal { .. } | Self::Dielectric { .. }
+        )
+    }
+
+    /// Whether it scatters light in all directions.
+    pub fn is_diffuse(&self) -> bool {
+        matches!(self, Self::Diffuse { .. })
+    }
+
+    /// Diffuse reflectance at the texture coordinates `uv`; black for other kinds.
+    pub fn diffuse_reflectance(&self, uv: Vec2) -> Rgb {
+        match self {
+            Self::Diffuse {
+                reflectance,
+                texture,
+            } => match texture {
+                Some(t) => *reflectance * t.sample(uv),
+                None => *reflectance,
+            },
+            _ => Rgb::ZERO,
+        }
+    }
+}

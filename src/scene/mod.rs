@@ -1,0 +1,81 @@
+//! What is lit: surfaces, materials, lights and the camera, with their loaders and the built-in scenes.
+//!
+//! Files are read in f64, moved to a local origin, and stored in f32 about it.
+
+pub mod built_in;
+pub mod camera;
+pub mod error;
+pub mod geometry;
+pub mod light;
+pub mod load;
+pub mod locate;
+pub mod material;
+pub mod obj;
+pub mod scene_file;
+pub mod shapes;
+pub mod source;
+pub mod texture;
+
+pub use camera::Camera;
+pub use error::SceneError;
+pub use geometry::Geometry;
+pub use light::Light;
+pub use material::Material;
+pub use source::open;
+
+use glam::{DVec3, Vec3};
+use scene_file::RenderFile;
+
+/// Everything that is lit, in metres about a local origin.
+#[derive(Clone, Debug)]
+pub struct Scene {
+    /// Name from the file, or the file's stem.
+    pub name: String,
+    /// Hash of the scene's text and of the files that it names.
+    pub hash: u64,
+    /// Where the local origin lies in the file's own coordinates, metres.
+    pub origin: DVec3,
+    /// Centre of the bounding box of all surfaces, in local coordinates, metres.
+    pub center: Vec3,
+    /// Radius of the sphere about `center` that holds all surfaces, metres; positive.
+    pub radius: f32,
+    /// The camera.
+    pub camera: Camera,
+    /// The surfaces.
+    pub geometry: Geometry,
+    /// Materials, indexed by [`Geometry`].
+    pub materials: Vec<Material>,
+    /// Light sources.
+    pub lights: Vec<Light>,
+    /// The `[render]` table as it was written.
+    pub render: RenderFile,
+    /// What was defined but odd, one line each.
+    pub warnings: Vec<String>,
+}
+
+impl Scene {
+    /// Resolution of f32 where the scene lies: lengths below it (metres) are rounding.
+    ///
+    /// `2⁻²²` of the scene's radius, so that it scales with the scene's unit.
+    pub fn resolution(&self) -> f32 {
+        self.radius * RESOLUTION
+    }
+
+    /// Sum of the lights' fluxes, the mean of the channels, W.
+    pub fn total_flux(&self) -> f64 {
+        self.lights
+            .iter()
+            .map(|l| f64::from(crate::math::rgb::mean(l.flux())))
+            .sum()
+    }
+
+    /// Whether any surface reflects or refracts without scattering.
+    pub fn has_specular(&self) -> bool {
+        self.geometry
+            .used_materials()
+            .any(|m| self.materials[m].is_specular())
+    }
+}
+
+/// Four units in the last place of the scene's radius, relative to it.
+pub const RESOLUTION: f32 = 1.0 / (1 << 22) as f32;

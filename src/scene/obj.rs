@@ -1,0 +1,288 @@
+//! OBJ and MTL through `tobj`: triangulated, in f64, with normals computed where they are missing.
+
+use crate::scene::geometry::NONE;
+use crate::scene::scene_file::MaterialFile;
+use crate::scene::shapes::Mesh;
+use glam::{DVec2, DVec3};
+use std::collections::HashMap;
+use std::path::Path;
+
+/// An OBJ file's surfaces and materials.
+pub struct ObjFile {
+    /// All triangles; `materials` index into the list beside it.
+    pub mesh: Mesh,
+    /// Materials by name, as the scene format writes them.
+    pub materials: Vec<(String, MaterialFile)>,
+    /// Text of the material files, for the scene's hash.
+    pub material_text: String,
+    /// What was odd, one line each.
+    pub warnings: Vec<String>,
+}
+
+/// What is wrong with an OBJ file, on which line (0 if none can be named).
+pub struct ObjError {
+    /// Line from 1, or 0.
+    pub line: usize,
+    /// What and what to do.
+    pub what: String,
+}
+
+/// Edges that bend by more than this stay sharp where normals are missing, degrees.
+pub const CREASE_ANGLE: f64 = 30.0;
+
+/// Faces around one vertex beyond which each keeps its own normal: grouping them is quadratic in their number.
+const MAX_FAN: usize = 256;
+
+/// Reads an OBJ from its text; material files are looked for beside `path`.
+///
+/// # Errors
+/// A line with a number that is none or not finite, an index out of range, or anything `tobj` refuses.
+pub fn read(path: &Path, text: &str, crease_angle: f64) -> Result<ObjFile, ObjError> {
+    check_lines(text)?;
+    let whole = |what: String| ObjError { line: 0, what };
+    let options = tobj::LoadOptions {
+        triangulate: true,
+        ignore_points: true,
+        ignore_lines: true,
+        single_index: false,
+        ..Default::default()
+    };
+    let folder = path.parent().unwrap_or(Path::new("")).to_owned();
+    let material_text = std::cell::RefCell::new(String::new());
+    let (models, materials) = tobj::load_obj_buf(&mut text.as_bytes(), &options, |name| {
+        let read = std::fs::read_to_string(folder.join(name))
+            .map_err(|_| tobj::LoadError::OpenFileFailed)?;
+        material_text.borrow_mut().push_str(&read);
+        tobj::load_mtl_buf(&mut read.as_bytes())
+    })
+    .map_err(|e| whole(format!("cannot be read as OBJ: {e}")))?;
+
+    let mut warnings = Vec::new();
+    let materials = materials.unwrap_or_else(|e| {
+        warnings.push(format!("{}: its material file: {e}", path.display()));
+        Vec::new()
+    });
+    let mut mesh = Mesh::default();
+    for model in &models {
+        append(&mut mesh, &model.mesh);
+    }
+    if mesh.triangles.is_empty() {
+        warnings.push(format!("{}: no faces", path.display()));
+    }
+    add_missing_normals(&mut mesh, crease_angle);
+    Ok(ObjFile {
+        mesh,
+        materials: materials
+            .iter()
+            .map(|m| (m.name.clone(), material_of(m)))
+            .collect(),
+        material_text: material_text.into_inner(),
+        warnings,
+    })
+}
+
+/// Finds the first line whose numbers are no numbers, or whose indices point nowhere.
+fn check_lines(text: &str) -> Result<(), ObjError> {
+    let mut counts: HashMap<&str, i64> = HashMap::new();
+    for (index, line) in text.lines().enumerate() {
+        let wrong = |what: String| {
+            Err(ObjError {
+                line: index + 1,
+                what,
+            })
+        };
+        let mut words = line.split_whitespace();
+        match words.next() {
+            Some(kind @ ("v" | "vn" | "vt")) => {
+                let mut numbers = 0;
+                for word in words {
+                    match word.parse::<f64>() {
+                        Ok(x) if x.is_finite() => numbers += 1,
+                        _ => return wrong(format!("`{kind}` wants finite numbers, got `{word}`")),
+                    }
+                }
+                if numbers < if kind == "vt" { 1 } else { 3 } {
+                    return wrong(format!(
+                        "`{kind}` has {numbers} numbers, too few; is the file cut off?"
+                    ));
+                }
+                *counts.entry(kind).or_default() += 1;
+            }
+            Some("f") => {
+                let mut corners = 0;
+                for word in words {
+                    corners += 1;
+                    for (part, kind) in word.split('/').zip(["v", "vt", "vn"]) {
+                        if part.is_empty() && kind == "vt" {
+                            continue;
+                        }
+                        let count = counts.get(kind).copied().unwrap_or(0);
+                        match part.parse::<i64>() {
+                            Ok(i) if (1..=count).contains(&i) || (-count..0).contains(&i) => {}
+                            Ok(i) => {
+                                return wrong(format!("index {i} of `{kind}`, of which there are {count}"));
+                            }
+                            Err(_) => return wrong(format!("`{word}` is no face corner")),
+                        }
+                    }
+                }
+                if corners < 3 {
+                    return wrong(format!("a face of {corners} corners; is the file cut off?"));
+                }
+            }
+            _ => {}
+        }
+    }
+    Ok(())
+}
+
+fn append(mesh: &mut Mesh, part: &tobj::Mesh) {
+    let triples = |v: &[f64]| -> Vec<DVec3> {
+        v.chunks_exact(3)
+            .map(|c| DVec3::new(c[0], c[1], c[2]))
+            .collect()
+    };
+    let (p0, n0, t0) = (
+        mesh.positions.len() as u32,
+        mesh.normals.len() as u32,
+        mesh.uvs.len() as u32,
+    );
+    mesh.positions.extend(triples(&part.positions));
+    mesh.normals.extend(triples(&part.normals));
+    mesh.uvs
+        .extend(part.texcoords.chunks_exact(2).map(|c| DVec2::new(c[0], c[1])));
+    let material = part.material_id.map_or(NONE, |m| m as u32);
+    let corner = |indices: &[u32], base: u32, at: usize| -> [u32; 3] {
+        match indices.get(at..at + 3) {
+            Some(i) if indices.len() == part.indices.len() => [i[0] + base, i[1] + base, i[2] + base],
+            _ => [NONE; 3],
+        }
+    };
+    for at in (0..part.indices.len() / 3 * 3).step_by(3) {
+        mesh.triangles.push(corner(&part.indices, p0, at));
+        let mut normals = corner(&part.normal_indices, n0, at);
+        if normals
+            .iter()
+            .any(|&n| n == NONE || mesh.normals[n as usize].length_squared() == 0.0)
+        {
+            normals = [NONE; 3];
+        }
+        mesh.corner_normals.push(normals);
+        mesh.corner_uvs.push(corner(&part.texcoord_indices, t0, at));
+        mesh.materials.push(material);
+    }
+}
+
+/// Gives corners without a normal the mean over the faces around their vertex that bend by less than the crease
+/// angle, weighted by the angle at the corner. Faces that turn out flat keep no normals.
+fn add_missing_normals(mesh: &mut Mesh, crease_angle: f64) {
+    let missing: Vec<usize> = (0..mesh.triangles.len())
+        .filter(|&t| mesh.corner_normals[t][0] == NONE)
+        .collect();
+    if missing.is_empty() || crease_angle <= 0.0 {
+        return;
+    }
+    let key = |p: DVec3| [p.x + 0.0, p.y + 0.0, p.z + 0.0].map(f64::to_bits);
+    let mut fans: HashMap<[u64; 3], Vec<(u32, f64)>> = HashMap::new();
+    let mut face = vec![DVec3::ZERO; mesh.triangles.len()];
+    for &t in &missing {
+        let p = mesh.triangles[t].map(|i| mesh.positions[i as usize]);
+        face[t] = (p[1] - p[0]).cross(p[2] - p[0]).normalize_or_zero();
+        for c in 0..3 {
+            let (a, b) = (p[(c + 1) % 3] - p[c], p[(c + 2) % 3] - p[c]);
+            let cos = (a.dot(b) / (a.length() * b.length())).clamp(-1.0, 1.0);
+            let angle = if cos.is_finite() { libm::acos(cos) } else { 0.0 };
+            fans.entry(key(p[c])).or_default().push((t as u32, angle));
+        }
+    }
+    let cos_crease = libm::cos(crease_angle.to_radians());
+    for &t in &missing {
+        let own = face[t];
+        let mut corners = [own; 3];
+        for (c, normal) in corners.iter_mut().enumerate() {
+            let fan = &fans[&key(mesh.positions[mesh.triangles[t][c] as usize])];
+            if fan.len() > MAX_FAN {
+                continue;
+            }
+            let sum: DVec3 = fan
+                .iter()
+                .filter(|(other, _)| face[*other as usize].dot(own) >= cos_crease)
+                .map(|(other, angle)| face[*other as usize] * *angle)
+                .sum();
+            *normal = sum.try_normalize().unwrap_or(own);
+        }
+        if corners.iter().any(|n| n.dot(own) < 1.0 - 1e-12) {
+            let base = mesh.normals.len() as u32;
+            mesh.normals.extend(corners);
+            mesh.corner_normals[t] = [base, base + 1, base + 2];
+        }
+    }
+}
+
+/// Illumination models of the MTL format as our kinds: 3 and 8 mirror, 5 metal, 4, 6, 7 and 9 (or `d` below 1)
+/// dielectric, `Ke` emissive, all else diffuse.
+fn material_of(m: &tobj::Material) -> MaterialFile {
+    let emission = m.emissive.unwrap_or([0.0; 3]);
+    let kind = match m.illumination_model {
+        _ if emission.iter().any(|&e| e > 0.0) => "emissive",
+        Some(3 | 8) => "mirror",
+        Some(5) => "metal",
+        Some(4 | 6 | 7 | 9) => "dielectric",
+        _ if m.dissolve.is_some_and(|d| d < 1.0) => "dielectric",
+        _ => "diffuse",
+    };
+    let mut file = MaterialFile {
+        kind: kind.into(),
+        ..Default::default()
+    };
+    match kind {
+        "emissive" => file.radiance = Some(emission),
+        "mirror" | "metal" => file.reflectance = Some(m.specular.unwrap_or([1.0; 3])),
+        "dielectric" => file.ior = Some(m.optical_density.unwrap_or(1.5).max(1.0)),
+        _ => {
+            file.reflectance = Some(m.diffuse.unwrap_or([0.8; 3]));
+            file.texture.clone_from(&m.diffuse_texture);
+        }
+    }
+    file
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read_text(text: &str) -> Result<ObjFile, ObjError> {
+        read(Path::new("t.obj"), text, CREASE_ANGLE)
+    }
+
+    #[test]
+    fn polygons_are_triangulated() {
+        let text = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n";
+        let obj = read_text(text).map_err(|e| e.what).expect("reads");
+        assert_eq!(obj.mesh.triangles.len(), 2);
+    }
+
+    #[test]
+    fn creases_stay_sharp_and_shallow_edges_become_smooth() {
+        // Two faces that share an edge, bent by 90° and by about 11°.
+        for (z, smooth) in [(1.0, false), (0.1, true)] {
+            let (x, z) = if smooth { (1.5, z) } else { (1.0, z) };
+            let text = format!("v 0 0 0\nv 1 0 0\nv 1 1 0\nv {x} 0 {z}\nf 1 2 3\nf 2 4 3\n");
+            let obj = read_text(&text).map_err(|e| e.what).expect("reads");
+            assert_eq!(obj.mesh.corner_normals[0][0] != NONE, smooth, "{z}");
+        }
+    }
+
+    #[test]
+    fn bad_lines_are_named() {
+        for (text, line) in [
+            ("v 0 0 0\nv 1 nan 0\n", 2),
+            ("v 0 0 0\nv 1 0 0\nv 0 1 0\n\nf 1 2 4\n", 5),
+            ("v 0 0\n", 1),
+            ("v 0 0 0\nf 1 1\n", 2),
+            ("v 0 0 0\nf a b c\n", 2),
+        ] {
+            assert_eq!(read_text(text).err().expect(text).line, line, "{text}");
+        }
+    }
+}

@@ -1,0 +1,81 @@
+//! Image textures.
+
+use crate::math::elementary::pow;
+use crate::math::rgb::Rgb;
+use glam::Vec2;
+use std::path::Path;
+
+/// An image of linear reflectances, repeated over the plane.
+#[derive(Clone, Debug)]
+pub struct Texture {
+    size: [u32; 2],
+    texels: Vec<Rgb>,
+}
+
+impl Texture {
+    /// Reads a PNG; its values are taken as sRGB and made linear.
+    ///
+    /// # Errors
+    /// The reason, if the file cannot be read or decoded.
+    pub fn load(path: &Path) -> Result<Self, String> {
+        let image = image::open(path).map_err(|e| e.to_string())?.to_rgb8();
+        let table: Vec<f32> = (0..256).map(|i| srgb_to_linear(i as f32 / 255.0)).collect();
+        Ok(Self {
+            size: [image.width(), image.height()],
+            texels: image
+                .pixels()
+                .map(|p| Rgb::from_array(p.0.map(|c| table[c as usize])))
+                .collect(),
+        })
+    }
+
+    /// Bilinear sample; `v` grows upwards, both coordinates repeat with period 1.
+    pub fn sample(&self, uv: Vec2) -> Rgb {
+        if self.texels.is_empty() || !uv.is_finite() {
+            return Rgb::ONE;
+        }
+        let [w, h] = self.size;
+        let x = (uv.x - uv.x.floor()) * w as f32 - 0.5;
+        let y = (1.0 - (uv.y - uv.y.floor())) * h as f32 - 0.5;
+        let (fx, fy) = (x - x.floor(), y - y.floor());
+        let at = |i: f32, j: f32| {
+            let i = (i as i64).rem_euclid(i64::from(w)) as usize;
+            let j = (j as i64).rem_euclid(i64::from(h)) as usize;
+            self.texels[j * w as usize + i]
+        };
+        let (x, y) = (x.floor(), y.floor());
+        let top = at(x, y).lerp(at(x + 1.0, y), fx);
+        let bottom = at(x, y + 1.0).lerp(at(x + 1.0, y + 1.0), fx);
+        top.lerp(bottom, fy)
+    }
+}
+
+/// Inverse of the sRGB transfer curve (IEC 61966-2-1).
+pub fn srgb_to_linear(c: f32) -> f32 {
+    if c <= 0.04045 {
+        c / 12.92
+    } else {
+        pow((c + 0.055) / 1.055, 2.4)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn samples_texel_centres_and_repeats() {
+        let t = Texture {
+            size: [2, 2],
+            texels: vec![Rgb::X, Rgb::Y, Rgb::Z, Rgb::ONE],
+        };
+        assert_eq!(t.sample(Vec2::new(0.25, 0.75)), Rgb::X);
+        assert_eq!(t.sample(Vec2::new(0.75, 0.75)), Rgb::Y);
+        assert_eq!(t.sample(Vec2::new(0.25, 0.25)), Rgb::Z);
+        assert_eq!(t.sample(Vec2::new(-0.25, 1.25)), Rgb::ONE);
+        assert_eq!(
+            t.sample(Vec2::new(0.5, 0.5)),
+            (Rgb::X + Rgb::Y + Rgb::Z + Rgb::ONE) / 4.0
+        );
+    }
+}

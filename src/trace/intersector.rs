@@ -1,0 +1,244 @@
+//! Closest hit and any hit on `obvhs`, with leaf tests of our own.
+
+use crate::scene::Geometry;
+use crate::trace::triangle::ShearedRay;
+use glam::{Vec3, Vec3A};
+use obvhs::BvhBuildParams;
+use obvhs::aabb::Aabb;
+use obvhs::cwbvh::CwBvh;
+use obvhs::cwbvh::builder::build_cwbvh;
+use obvhs::ray::RayHit;
+use std::time::Duration;
+
+/// A ray in local coordinates.
+#[derive(Clone, Copy, Debug)]
+pub struct Ray {
+    /// Start, metres.
+    pub origin: Vec3,
+    /// Unit direction.
+    pub direction: Vec3,
+}
+
+/// Where a ray meets a surface.
+#[derive(Clone, Copy, Debug)]
+pub struct Hit {
+    /// Distance, metres, positive.
+    pub t: f32,
+    /// Index of the triangle or sphere, as in [`Geometry`].
+    pub primitive: u32,
+    /// Weights of a triangle's second and third corner.
+    pub weights: [f32; 2],
+}
+
+/// A bounding volume hierarchy over a scene's surfaces.
+pub struct Intersector {
+    bvh: CwBvh,
+    /// Primitive of each leaf entry.
+    primitives: Vec<u32>,
+    /// Corners of each leaf entry, in the order in which rays meet them; for a sphere centre and radius.
+    leaves: Vec<[Vec3; 3]>,
+    triangle_count: u32,
+}
+
+/// Boxes grow by this part of the scene's radius, so that no rounding in the box test loses a hit in the leaf test.
+const PADDING: f32 = 1e-6;
+
+impl Intersector {
+    /// Builds over all of `geometry`; `radius` is the scene's.
+    pub fn new(geometry: &Geometry, radius: f32) -> Self {
+        let count = geometry.primitive_count();
+        let boxes: Vec<Aabb> = (0..count)
+            .map(|i| {
+                let (low, high) = geometry.bounds(i);
+                Aabb::new(
+                    Vec3A::from(low) - radius * PADDING,
+                    Vec3A::from(high) + radius * PADDING,
+                )
+            })
+            .collect();
+        let bvh = if count == 0 {
+            CwBvh::default()
+        } else {
+            build_cwbvh(&boxes, build_parameters(count), &mut Duration::default())
+        };
+        let primitives = bvh.primitive_indices.clone();
+        let triangle_count = geometry.triangles.len() as u32;
+        let leaves = primitives
+            .iter()
+            .map(|&p| {
+                if p < triangle_count {
+                    geometry.corners(p as usize)
+                } else {
+                    let s = geometry.spheres[(p - triangle_count) as usize];
+                    [s.center, Vec3::splat(s.radius), Vec3::ZERO]
+                }
+            })
+            .collect();
+        Self {
+            bvh,
+            primitives,
+            leaves,
+            triangle_count,
+        }
+    }
+
+    /// The nearest surface along `ray`. None for a ray that is not finite.
+    pub fn closest(&self, ray: &Ray) -> Option<Hit> {
+        let traversal = self.start(ray, f32::INFINITY)?;
+        let sheared = ShearedRay::new(ray.origin, ray.direction);
+        let mut best = Hit {
+            t: f32::INFINITY,
+            primitive: 0,
+            weights: [0.0; 2],
+        };
+        self.bvh
+            .ray_traverse(traversal, &mut RayHit::none(), |r, leaf| {
+                match self.leaf(ray, &sheared, leaf, r.tmax) {
+                    Some((t, b, c)) => {
+                        best = Hit {
+                            t,
+                            primitive: self.primitives[leaf],
+                            weights: [b, c],
+                        };
+                        t
+                    }
+                    None => f32::INFINITY,
+                }
+            });
+        best.t.is_finite().then_some(best)
+    }
+
+    /// Whether anything lies along `ray` before the distance `t_max`, metres.
+    pub fn any(&self, ray: &Ray, t_max: f32) -> bool {
+        let Some(traversal) = self.start(ray, t_max) else {
+            return false;
+        };
+        let sheared = ShearedRay::new(ray.origin, ray.direction);
+        !self.bvh.ray_traverse_miss(traversal, |r, leaf| {
+            self.leaf(ray, &sheared, leaf, r.tmax)
+                .map_or(f32::INFINITY, |(t, ..)| t)
+        })
+    }
+
+    fn start(&self, ray: &Ray, t_max: f32) -> Option<obvhs::ray::Ray> {
+        let sound = ray.origin.is_finite()
+            && ray.direction.is_finite()
+            && ray.direction != Vec3::ZERO
+            && t_max > 0.0
+            && !self.primitives.is_empty();
+        sound.then(|| obvhs::ray::Ray::new(ray.origin.into(), ray.direction.into(), 0.0, t_max))
+    }
+
+    #[inline]
+    fn leaf(&self, ray: &Ray, sheared: &ShearedRay, leaf: usize, t_max: f32) -> Option<(f32, f32, f32)> {
+        let shape = &self.leaves[leaf];
+        if self.primitives[leaf] < self.triangle_count {
+            sheared.intersect(shape, t_max)
+        } else {
+            sphere(ray, shape[0], shape[1].x, t_max).map(|t| (t, 0.0, 0.0))
+        }
+    }
+}
+
+/// Distance to a sphere from outside or inside; f64, because the discriminant cancels.
+fn sphere(ray: &Ray, center: Vec3, radius: f32, t_max: f32) -> Option<f32> {
+    let d = ray.direction.as_dvec3();
+    let o = ray.origin.as_dvec3() - center.as_dvec3();
+    let a = d.length_squared();
+    let b = o.dot(d);
+    // |o - (o·d)d|² against r² keeps its digits for far origins.
+    let off = (o - d * (b / a)).length_squared();
+    let rest = f64::from(radius).powi(2) - off;
+    if rest < 0.0 {
+        return None;
+    }
+    let half = (rest / a).sqrt();
+    let (near, far) = ((-b / a - half) as f32, (-b / a + half) as f32);
+    let t = if near > 0.0 { near } else { far };
+    (t > 0.0 && t < t_max).then_some(t)
+}
+
+/// Slow builders pay off while building is short against the rays to come.
+fn build_parameters(primitives: usize) -> BvhBuildParams {
+    match primitives {
+        0..20_000 => BvhBuildParams::very_slow_build(),
+        20_000..500_000 => BvhBuildParams::slow_build(),
+        500_000..4_000_000 => BvhBuildParams::medium_build(),
+        _ => BvhBuildParams::fast_build(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::sequence::{Sampling, Sequence};
+    use crate::scene::geometry::{NONE, Sphere};
+
+    fn soup(triangles: usize, spheres: usize) -> Geometry {
+        let sequence = Sequence::new(Sampling::Random, 5);
+        let mut g = Geometry::default();
+        let p = |i: usize, set| {
+            let x = sequence.four(i as u64, set);
+            Vec3::new(x[0], x[1], x[2])
+        };
+        for i in 0..triangles {
+            let base = g.positions.len() as u32;
+            g.positions
+                .extend((0..3).map(|c| p(i, 0) + 0.2 * p(i, 1 + c)));
+            g.triangles.push([base, base + 1, base + 2]);
+            g.corner_normals.push([NONE; 3]);
+            g.corner_uvs.push([NONE; 3]);
+            g.triangle_materials.push(0);
+        }
+        for i in 0..spheres {
+            g.spheres.push(Sphere {
+                center: p(i, 9),
+                radius: 0.03,
+                material: 0,
+            });
+        }
+        g
+    }
+
+    #[test]
+    fn hits_equal_brute_force() {
+        for (triangles, spheres) in [(0, 0), (1, 0), (0, 1), (2, 1), (400, 60)] {
+            let g = soup(triangles, spheres);
+            let intersector = Intersector::new(&g, 1.0);
+            let sequence = Sequence::new(Sampling::Random, 6);
+            for i in 0..3000 {
+                let x = sequence.four(i, 0);
+                let y = sequence.four(i, 1);
+                let ray = Ray {
+                    origin: Vec3::new(x[0], x[1], x[2]) * 2.0 - 0.5,
+                    direction: crate::math::frame::uniform_sphere(y[0], y[1]).normalize(),
+                };
+                let sheared = ShearedRay::new(ray.origin, ray.direction);
+                let brute = (0..g.primitive_count())
+                    .filter_map(|k| {
+                        if k < triangles {
+                            sheared.intersect(&g.corners(k), f32::INFINITY).map(|h| h.0)
+                        } else {
+                            let s = g.spheres[k - triangles];
+                            sphere(&ray, s.center, s.radius, f32::INFINITY)
+                        }
+                    })
+                    .fold(f32::INFINITY, f32::min);
+                let found = intersector.closest(&ray).map_or(f32::INFINITY, |h| h.t);
+                assert_eq!(found, brute);
+                let t_max = 0.3 + y[2];
+                assert_eq!(intersector.any(&ray, t_max), brute < t_max);
+            }
+        }
+    }
+
+    #[test]
+    fn a_ray_that_is_not_finite_meets_nothing() {
+        let intersector = Intersector::new(&soup(10, 0), 1.0);
+        let ray = Ray {
+            origin: Vec3::splat(f32::NAN),
+            direction: Vec3::X,
+        };
+        assert!(intersector.closest(&ray).is_none());
+    }
+}

@@ -1,0 +1,131 @@
+//! A watertight ray-triangle test (Woop, Benthin and Wald 2013).
+
+use glam::Vec3;
+
+/// A ray sheared so that it runs along its longest axis; made once for each ray.
+#[derive(Clone, Copy, Debug)]
+pub struct ShearedRay {
+    origin: [f32; 3],
+    axes: [usize; 3],
+    shear: [f32; 3],
+}
+
+impl ShearedRay {
+    /// Prepares a ray; `direction` must be finite and not zero.
+    pub fn new(origin: Vec3, direction: Vec3) -> Self {
+        let d = direction.to_array();
+        let a = direction.abs();
+        let kz = if a.x >= a.y && a.x >= a.z {
+            0
+        } else if a.y >= a.z {
+            1
+        } else {
+            2
+        };
+        let (mut kx, mut ky) = ((kz + 1) % 3, (kz + 2) % 3);
+        if d[kz] < 0.0 {
+            std::mem::swap(&mut kx, &mut ky);
+        }
+        Self {
+            origin: origin.to_array(),
+            axes: [kx, ky, kz],
+            shear: [d[kx] / d[kz], d[ky] / d[kz], 1.0 / d[kz]],
+        }
+    }
+
+    /// Distance along the ray and the weights of the second and third corner, if the triangle is met from either
+    /// side at a distance in `(0, t_max)`. An edge shared by two triangles is never missed by both.
+    #[inline]
+    pub fn intersect(&self, corners: &[Vec3; 3], t_max: f32) -> Option<(f32, f32, f32)> {
+        let [kx, ky, kz] = self.axes;
+        let [sx, sy, sz] = self.shear;
+        let mut x = [0.0f32; 3];
+        let mut y = [0.0f32; 3];
+        let mut z = [0.0f32; 3];
+        for i in 0..3 {
+            let c = corners[i].to_array();
+            z[i] = c[kz] - self.origin[kz];
+            x[i] = (c[kx] - self.origin[kx]) - sx * z[i];
+            y[i] = (c[ky] - self.origin[ky]) - sy * z[i];
+        }
+        let mut u = x[2] * y[1] - y[2] * x[1];
+        let mut v = x[0] * y[2] - y[0] * x[2];
+        let mut w = x[1] * y[0] - y[1] * x[0];
+        if u == 0.0 || v == 0.0 || w == 0.0 {
+            // A product may have rounded to the other's value: products of f32 are exact in f64.
+            let edge = |a: usize, b: usize| {
+                (f64::from(x[a]) * f64::from(y[b]) - f64::from(y[a]) * f64::from(x[b])) as f32
+            };
+            u = edge(2, 1);
+            v = edge(0, 2);
+            w = edge(1, 0);
+        }
+        if (u < 0.0 || v < 0.0 || w < 0.0) && (u > 0.0 || v > 0.0 || w > 0.0) {
+            return None;
+        }
+        let det = u + v + w;
+        if det == 0.0 {
+            return None;
+        }
+        let t = (u * z[0] + v * z[1] + w * z[2]) * sz / det;
+        (t > 0.0 && t < t_max).then(|| (t, v / det, w / det))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::frame::{uniform_sphere, unit_or};
+    use crate::math::sequence::{Sampling, Sequence};
+
+    #[test]
+    fn hits_agree_with_the_plane_equation() {
+        let sequence = Sequence::new(Sampling::Random, 1);
+        let mut hits = 0;
+        for i in 0..20_000 {
+            let p = |set| {
+                let x = sequence.four(i, set);
+                Vec3::new(x[0], x[1], x[2]) * 2.0 - 1.0
+            };
+            let corners = [p(0), p(1), p(2)];
+            let o = p(3) * 3.0;
+            let d = unit_or(p(4) - o, Vec3::X);
+            let Some((t, b, c)) = ShearedRay::new(o, d).intersect(&corners, f32::INFINITY) else {
+                continue;
+            };
+            hits += 1;
+            let on_triangle = corners[0] * (1.0 - b - c) + corners[1] * b + corners[2] * c;
+            let n = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize();
+            if n.dot(d).abs() > 1e-2 {
+                assert!((o + d * t - on_triangle).length() < 2e-4 * (1.0 + t));
+            }
+        }
+        assert!(hits > 500);
+    }
+
+    /// Rays from inside a closed octahedron aimed exactly at its vertices and edges never leave it.
+    #[test]
+    fn no_ray_leaks_through_edges_or_vertices() {
+        let v = [Vec3::X, Vec3::Y, Vec3::Z, -Vec3::X, -Vec3::Y, -Vec3::Z].map(|v| v * 0.7 + 0.03);
+        let faces = [
+            [0, 1, 2], [1, 3, 2], [3, 4, 2], [4, 0, 2], [1, 0, 5], [3, 1, 5], [4, 3, 5], [0, 4, 5],
+        ];
+        let sequence = Sequence::new(Sampling::Random, 2);
+        for i in 0..200_000u64 {
+            let x = sequence.four(i, 0);
+            let o = uniform_sphere(x[0], x[1]) * 0.2 * x[2];
+            let f = faces[i as usize % 8];
+            let along = match i % 3 {
+                0 => 0.0,
+                1 => 1.0,
+                _ => x[3],
+            };
+            let target = v[f[0]].lerp(v[f[1]], along);
+            let ray = ShearedRay::new(o, (target - o).normalize());
+            let met = faces
+                .iter()
+                .any(|f| ray.intersect(&f.map(|k| v[k]), f32::INFINITY).is_some());
+            assert!(met, "leak towards {target}");
+        }
+    }
+}
