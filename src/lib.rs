@@ -11,6 +11,6 @@ pub mod trace;
 pub mod photons;
 pub mod estimate;
 pub mod render;
-pub mod measure;
-pub mod export;
-pub mod cli;
+
+
+

@@ -146,12 +146,17 @@ impl PhotonMap {
     pub fn nearest(&self, query: &Query, k: usize, heap: &mut Nearest, out: &mut Vec<u32>) {
         let [a, b] = query.axes;
         let view_radius = (a + b).length().max((a - b).length());
-        self.nearest_within(query, k, view_radius + self.longest_reach, heap);
+        // A photon farther than its reach from the view plane has no weight on it: the slice is exact.
+        self.nearest_in(query, k, view_radius + self.longest_reach, self.longest_reach, heap);
         out.extend(heap.iter().map(|(_, i)| *i));
     }
 
-    /// Leaves in `heap` the `k` photons nearest to the query's centre within `radius` metres.
-    pub fn nearest_within(&self, query: &Query, k: usize, radius: f32, heap: &mut Nearest) {
+    /// Leaves in `heap` the `k` photons nearest to the query's centre, however far, for density estimation.
+    pub fn nearest_anywhere(&self, query: &Query, k: usize, heap: &mut Nearest) {
+        self.nearest_in(query, k, f32::INFINITY, f32::INFINITY, heap);
+    }
+
+    fn nearest_in(&self, query: &Query, k: usize, radius: f32, slice: f32, heap: &mut Nearest) {
         heap.clear();
         let Some(tree) = &self.kd_tree else { return };
         let nearest = NearestQuery {
@@ -159,8 +164,7 @@ impl PhotonMap {
             radius,
             k,
             normal: query.normal,
-            // Beyond its longest axis a footprint has no weight above its plane.
-            slice: if radius.is_finite() { self.longest_reach.max(radius) } else { f32::INFINITY },
+            slice,
         };
         tree.nearest(&nearest, heap, |i| self.photons[i as usize].lights(query.normal));
     }

@@ -769,6 +769,7 @@ impl Loader<'_> {
             geometry,
             materials: self.assembly.materials,
             render,
+            render_lines: self.locator.lines_of("render"),
             warnings: self.warnings,
         })
     }

@@ -46,6 +46,19 @@ impl<'a> Locator<'a> {
         }
     }
 
+    /// The file, and the line of each key of the table `name`.
+    pub fn lines_of(&self, name: &str) -> (PathBuf, std::collections::BTreeMap<String, usize>) {
+        let mut lines = std::collections::BTreeMap::new();
+        if let Some(table) = &self.table
+            && let Some(DeValue::Table(t)) = table.get_ref().get(name).map(|v| v.get_ref())
+        {
+            for (key, _) in t.iter() {
+                lines.insert(key.get_ref().to_string(), self.line_at(key.span().start));
+            }
+        }
+        (self.file.clone(), lines)
+    }
+
     fn line_at(&self, byte: usize) -> usize {
         let end = byte.min(self.text.len());
         1 + self.text.as_bytes()[..end]

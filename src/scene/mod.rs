@@ -49,6 +49,8 @@ pub struct Scene {
     pub lights: Vec<Light>,
     /// The `[render]` table as it was written.
     pub render: RenderFile,
+    /// The file, or the built-in's name with `.toml`, and the line of each key of `[render]`.
+    pub render_lines: (std::path::PathBuf, std::collections::BTreeMap<String, usize>),
     /// What was defined but odd, one line each.
     pub warnings: Vec<String>,
 }

@@ -1,0 +1,259 @@
+//! Direct light by shadow rays.
+
+use crate::math::elementary::pow;
+use crate::math::frame::direction;
+use crate::math::rgb::Rgb;
+use crate::math::sequence::Sequence;
+use crate::photons::emission::sample_triangles;
+use crate::scene::{Light, Scene};
+use crate::trace::surface::SELF_INTERSECTION;
+use crate::trace::{Intersector, Ray};
+use glam::Vec3;
+use std::f32::consts::{PI, TAU};
+
+/// Part of the way to a light's surface that a shadow ray covers, so that it does not meet the light itself.
+const SHORT_OF_LIGHT: f32 = 1.0 - 1e-4;
+
+/// Dimension set of a light's shadow rays; sets below belong to the view path.
+const LIGHT_SETS: u32 = 1024;
+
+/// A point that is lit.
+#[derive(Clone, Copy, Debug)]
+pub struct Receiver {
+    /// On the surface, metres.
+    pub position: Vec3,
+    /// Unit normal on the side that is lit.
+    pub normal: Vec3,
+}
+
+/// Irradiance from all lights at a receiver, W/m², with `rays` shadow rays to each light that has an area.
+///
+/// A shadow ray stops at glass too: what comes through is caustic light. `index` picks the numbers of `sequence`.
+pub fn irradiance(
+    scene: &Scene,
+    intersector: &Intersector,
+    receiver: &Receiver,
+    rays: u32,
+    sequence: &Sequence,
+    index: u64,
+) -> Rgb {
+    let mut sum = Rgb::ZERO;
+    for (i, light) in scene.lights.iter().enumerate() {
+        let has_area = matches!(light, Light::Sphere { .. } | Light::Quad { .. } | Light::Mesh { .. });
+        let count = if has_area { rays } else { 1 };
+        let mut own = Rgb::ZERO;
+        for ray in 0..count {
+            let x = sequence.four(index * u64::from(count) + u64::from(ray), LIGHT_SETS + i as u32);
+            if let Some(sample) = sample(light, receiver, scene.radius, x[0], x[1]) {
+                let origin = receiver.position + receiver.normal * (scene.radius * SELF_INTERSECTION);
+                let towards = Ray {
+                    origin,
+                    direction: sample.direction,
+                };
+                if !intersector.any(&towards, sample.distance) {
+                    own += sample.irradiance;
+                }
+            }
+        }
+        sum += own / count as f32;
+    }
+    sum
+}
+
+/// Light from one place, if nothing stands in the way.
+struct LightSample {
+    direction: Vec3,
+    /// Free way that is needed, metres.
+    distance: f32,
+    irradiance: Rgb,
+}
+
+fn sample(light: &Light, r: &Receiver, scene_radius: f32, u: f32, v: f32) -> Option<LightSample> {
+    match light {
+        Light::Point { position, power } => towards(r, *position, |_| *power / (4.0 * PI)),
+        Light::Spot {
+            position,
+            direction,
+            cos_half,
+            falloff,
+            power,
+        } => {
+            let axial = *power / Light::spot_normalization(*cos_half, *falloff);
+            towards(r, *position, |w| {
+                let cos = -w.dot(*direction);
+                if cos < *cos_half || (*falloff > 0.0 && cos <= 0.0) {
+                    Rgb::ZERO
+                } else if *falloff == 0.0 {
+                    axial
+                } else {
+                    axial * pow(cos, *falloff)
+                }
+            })
+        }
+        Light::Directional {
+            direction,
+            irradiance,
+            ..
+        } => {
+            let cos = -direction.dot(r.normal);
+            (cos > 0.0).then(|| LightSample {
+                direction: -*direction,
+                distance: 4.0 * scene_radius,
+                irradiance: *irradiance * cos,
+            })
+        }
+        Light::Sphere { center, radius, .. } => sphere(r, *center, *radius, light.radiance(), u, v),
+        Light::Quad {
+            center,
+            u: eu,
+            v: ev,
+            ..
+        } => {
+            let position = *center + *eu * (2.0 * u - 1.0) + *ev * (2.0 * v - 1.0);
+            let n = eu.cross(*ev);
+            from_surface(r, position, n.normalize(), light.radiance() * (4.0 * n.length()))
+        }
+        Light::Mesh {
+            triangles,
+            cumulative_area,
+            radiance,
+        } => {
+            let (position, n) = sample_triangles(triangles, cumulative_area, u, v);
+            from_surface(r, position, n, *radiance * *cumulative_area.last()?)
+        }
+    }
+}
+
+/// A point light of that intensity (W/sr) in the direction from the light's point of view reversed.
+fn towards(r: &Receiver, position: Vec3, intensity: impl Fn(Vec3) -> Rgb) -> Option<LightSample> {
+    let offset = position - r.position;
+    let distance = offset.length();
+    let w = offset / distance;
+    let cos = w.dot(r.normal);
+    if !(cos > 0.0 && distance.is_finite()) {
+        return None;
+    }
+    let intensity = intensity(w);
+    (intensity != Rgb::ZERO).then(|| LightSample {
+        direction: w,
+        distance: distance * SHORT_OF_LIGHT,
+        irradiance: intensity * (cos / (distance * distance)),
+    })
+}
+
+/// One point of a surface that stands for all of it; `radiance_area` is radiance times area.
+fn from_surface(r: &Receiver, position: Vec3, n: Vec3, radiance_area: Rgb) -> Option<LightSample> {
+    let facing = -(position - r.position).normalize_or_zero().dot(n);
+    (facing > 0.0)
+        .then(|| towards(r, position, |_| radiance_area * facing))
+        .flatten()
+}
+
+/// A direction within the cone that a sphere fills, uniform over solid angle.
+fn sphere(r: &Receiver, center: Vec3, radius: f32, radiance: Rgb, u: f32, v: f32) -> Option<LightSample> {
+    let offset = center - r.position;
+    let d2 = offset.length_squared();
+    let sin2 = radius * radius / d2;
+    if !(sin2 < 1.0) {
+        return None;
+    }
+    // 1 - cos without cancellation.
+    let rest = sin2 / (1.0 + (1.0 - sin2).sqrt());
+    let solid_angle = TAU * rest;
+    let away = rest * u;
+    let w = direction(offset / d2.sqrt(), 1.0 - away, TAU * v);
+    let cos = w.dot(r.normal);
+    if cos <= 0.0 {
+        return None;
+    }
+    let along = offset.dot(w);
+    let half = (radius * radius - (d2 - along * along)).max(0.0).sqrt();
+    Some(LightSample {
+        direction: w,
+        distance: (along - half) * SHORT_OF_LIGHT,
+        irradiance: radiance * (solid_angle * cos),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::sequence::Sampling;
+    use crate::scene::{built_in, source::open_built_in};
+
+    fn lit_by(light: Light, position: Vec3, rays: u32) -> f32 {
+        let b = built_in::find("plane").expect("built in");
+        let mut scene = open_built_in(b).expect("opens");
+        scene.lights = vec![light];
+        let intersector = Intersector::new(&scene.geometry, scene.radius);
+        let receiver = Receiver { position, normal: Vec3::Y };
+        let sequence = Sequence::new(Sampling::Sobol, 1);
+        irradiance(&scene, &intersector, &receiver, rays, &sequence, 0).x
+    }
+
+    /// Each kind of light against its closed form.
+    #[test]
+    fn irradiance_has_its_closed_forms() {
+        let at = Vec3::new(0.4, 0.0, -0.3);
+        let position = Vec3::new(-0.2, 1.1, 0.5);
+        let offset = position - at;
+        let d = offset.length();
+        let cos = offset.y / d;
+        let power = Rgb::splat(30.0);
+        let point = lit_by(Light::Point { position, power }, at, 1);
+        let expected = 30.0 * cos / (4.0 * PI * d * d);
+        assert!((point / expected - 1.0).abs() < 1e-5);
+
+        // A Lambertian sphere above the horizon lights like its centre.
+        let sphere = lit_by(Light::Sphere { center: position, radius: 0.3, power }, at, 4096);
+        assert!((sphere / expected - 1.0).abs() < 1e-3, "{sphere} {expected}");
+
+        // A parallel square above: the form factor from a differential element to a rectangle at its corner.
+        let (h, e) = (1.5f32, 0.4f32);
+        let quad = lit_by(
+            Light::Quad { center: Vec3::new(0.0, h, 0.0), u: Vec3::X * e, v: Vec3::Z * e, power },
+            Vec3::ZERO,
+            4096,
+        );
+        let x = e / h;
+        let corner = x / (1.0 + x * x).sqrt() * (x / (1.0 + x * x).sqrt()).atan() / PI;
+        let radiosity = 30.0 / (4.0 * e * e);
+        assert!((quad / (4.0 * corner * radiosity) - 1.0).abs() < 1e-3, "{quad}");
+
+        let half = 0.5f32;
+        let axis = -offset.normalize();
+        let spot = |falloff| {
+            lit_by(Light::Spot { position, direction: axis, cos_half: half.cos(), falloff, power }, at, 1)
+        };
+        let omega = TAU * (1.0 - half.cos());
+        assert!((spot(0.0) / (30.0 / omega * cos / (d * d)) - 1.0).abs() < 1e-4);
+        let lobe = TAU * (1.0 - half.cos().powi(5)) / 5.0;
+        assert!((spot(4.0) / (30.0 / lobe * cos / (d * d)) - 1.0).abs() < 1e-4);
+
+        let beam = lit_by(
+            Light::Directional {
+                direction: Vec3::new(0.0, -0.8, 0.6),
+                irradiance: Rgb::splat(5.0),
+                disc_center: Vec3::Y * 9.0,
+                disc_radius: 6.0,
+            },
+            at,
+            1,
+        );
+        assert!((beam - 4.0).abs() < 1e-5);
+
+        // Two triangles make the quad.
+        let c = [Vec3::new(-e, h, -e), Vec3::new(e, h, -e), Vec3::new(e, h, e), Vec3::new(-e, h, e)];
+        let mesh = Light::mesh(vec![[c[0], c[1], c[2]], [c[0], c[2], c[3]]], Rgb::splat(radiosity / PI));
+        let mesh = lit_by(mesh, Vec3::ZERO, 4096);
+        assert!((mesh / quad - 1.0).abs() < 5e-3, "{mesh} {quad}");
+    }
+
+    #[test]
+    fn light_from_behind_or_within_gives_nothing() {
+        let power = Rgb::ONE;
+        assert_eq!(lit_by(Light::Point { position: Vec3::NEG_Y, power }, Vec3::ZERO, 1), 0.0);
+        assert_eq!(lit_by(Light::Sphere { center: Vec3::ZERO, radius: 1.0, power }, Vec3::ZERO, 1), 0.0);
+        assert_eq!(lit_by(Light::Point { position: Vec3::ZERO, power }, Vec3::ZERO, 1), 0.0);
+    }
+}

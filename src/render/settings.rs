@@ -1,0 +1,254 @@
+//! Settings of a render: the scene's `[render]` table with the command line's flags on top, checked.
+
+use crate::estimate::registry;
+use crate::math::sequence::Sampling;
+use crate::photons::spread::DiffuseSpread;
+use crate::scene::Scene;
+use crate::scene::scene_file::RenderFile;
+use serde::Serialize;
+
+/// How photons are looked up.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Gather {
+    /// The k nearest of each map, as published.
+    Knn,
+    /// Every photon whose footprint meets the query.
+    Overlap,
+}
+
+/// Which light an image shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum LightPart {
+    /// Everything.
+    All,
+    /// Light straight from the lights, and the lights themselves.
+    Direct,
+    /// Light that came by specular surfaces alone.
+    Caustic,
+    /// Light that was scattered before.
+    Global,
+}
+
+/// Where direct light comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum DirectLight {
+    /// Shadow rays.
+    ShadowRays,
+    /// Stored direct photons.
+    Photons,
+}
+
+/// Whether parts that the scene does not need are left out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Default)]
+#[serde(rename_all = "snake_case")]
+pub enum PlanMode {
+    /// They are.
+    #[default]
+    Needed,
+    /// Every part is forced on.
+    Full,
+}
+
+/// Everything that decides an image, but the scene and the estimators.
+#[derive(Clone, Debug, Serialize)]
+pub struct RenderSettings {
+    /// Photons emitted per pass, at least 1.
+    pub photons: u64,
+    /// Estimator of `render`, with its settings.
+    pub estimator: String,
+    /// How photons are looked up.
+    pub gather: Gather,
+    /// Photons that `knn` and `density` look up in each map, at least 1.
+    pub k: usize,
+    /// Factor on the axes of all photon footprints, positive.
+    pub footprint_scale: f32,
+    /// Surfaces that a path may meet, at least 1.
+    pub max_depth: u32,
+    /// Specular view hits at which both branches are followed.
+    pub split_depth: u32,
+    /// Which light is shown.
+    pub light: LightPart,
+    /// Where direct light comes from.
+    pub direct: DirectLight,
+    /// Shadow rays to each light with area for each view hit, at least 1.
+    pub shadow_rays: u32,
+    /// Numbers that photons are made of.
+    pub sampling: Sampling,
+    /// Rule for diffuse bounces.
+    pub diffuse_spread: DiffuseSpread,
+    /// Pixels across and down.
+    pub size: [u32; 2],
+    /// Seed of everything random.
+    pub seed: u64,
+    /// Whether unneeded parts are left out.
+    pub plan: PlanMode,
+}
+
+/// A setting that can't be; one line.
+#[derive(Debug, thiserror::Error)]
+#[error("{place}: {what}")]
+pub struct SettingError {
+    /// The flag, or file, line and key.
+    pub place: String,
+    /// What is wrong and what would be right.
+    pub what: String,
+}
+
+/// Largest number of photons in a pass; an index must fit a map.
+pub const MAX_PHOTONS: i64 = 1 << 31;
+/// Largest number of pixels across or down.
+pub const MAX_SIZE: u32 = 32_768;
+/// Largest number of pixels.
+pub const MAX_PIXELS: u64 = 1 << 28;
+
+impl RenderSettings {
+    /// The scene's settings with `flags` on top. `size` and `seed` are the command line's alone.
+    ///
+    /// # Errors
+    /// The first value out of range, by its flag or its line in the scene file.
+    pub fn new(scene: &Scene, flags: &RenderFile, size: Option<[u32; 2]>, seed: u64) -> Result<Self, SettingError> {
+        let pick = Picker { scene, flags };
+        let settings = Self {
+            photons: pick.integer("photons", |f| f.photons, 200_000, 1, MAX_PHOTONS)? as u64,
+            estimator: pick.estimator()?,
+            gather: pick.choice(
+                "gather",
+                |f| f.gather.as_deref(),
+                Gather::Overlap,
+                &[("knn", Gather::Knn), ("overlap", Gather::Overlap)],
+            )?,
+            k: pick.integer("k", |f| f.k, 50, 1, 1_000_000)? as usize,
+            footprint_scale: pick.positive("footprint_scale", |f| f.footprint_scale, 3.0, 1e6)? as f32,
+            max_depth: pick.integer("max_depth", |f| f.max_depth, 20, 1, 1000)? as u32,
+            split_depth: pick.integer("split_depth", |f| f.split_depth, 1, 0, 8)? as u32,
+            light: pick.choice(
+                "light",
+                |f| f.light.as_deref(),
+                LightPart::All,
+                &[
+                    ("all", LightPart::All),
+                    ("direct", LightPart::Direct),
+                    ("caustic", LightPart::Caustic),
+                    ("global", LightPart::Global),
+                ],
+            )?,
+            direct: pick.choice(
+                "direct",
+                |f| f.direct.as_deref(),
+                DirectLight::ShadowRays,
+                &[("shadow_rays", DirectLight::ShadowRays), ("photons", DirectLight::Photons)],
+            )?,
+            shadow_rays: pick.integer("shadow_rays", |f| f.shadow_rays, 4, 1, 4096)? as u32,
+            sampling: pick.choice(
+                "sampling",
+                |f| f.sampling.as_deref(),
+                Sampling::Sobol,
+                &[("sobol", Sampling::Sobol), ("random", Sampling::Random)],
+            )?,
+            diffuse_spread: pick.choice(
+                "diffuse_spread",
+                |f| f.diffuse_spread.as_deref(),
+                DiffuseSpread::Polar,
+                &[("polar", DiffuseSpread::Polar), ("as_published", DiffuseSpread::AsPublished)],
+            )?,
+            size: size.unwrap_or(scene.camera.resolution),
+            seed,
+            plan: PlanMode::Needed,
+        };
+        pick.choice("final_gather", |f| f.final_gather.as_deref(), (), &[("none", ())])?;
+        let [w, h] = settings.size;
+        if w == 0 || h == 0 || w > MAX_SIZE || h > MAX_SIZE || u64::from(w) * u64::from(h) > MAX_PIXELS {
+            return Err(SettingError {
+                place: if size.is_some() { "--size".into() } else { "camera.resolution".into() },
+                what: format!(
+                    "{w}x{h} pixels; give 1 to {MAX_SIZE} each way, and {} million in all at most",
+                    MAX_PIXELS >> 20
+                ),
+            });
+        }
+        Ok(settings)
+    }
+}
+
+struct Picker<'a> {
+    scene: &'a Scene,
+    flags: &'a RenderFile,
+}
+
+impl Picker<'_> {
+    fn get<'s, T>(&'s self, f: impl Fn(&'s RenderFile) -> Option<T>) -> (Option<T>, bool) {
+        match f(self.flags) {
+            Some(v) => (Some(v), true),
+            None => (f(&self.scene.render), false),
+        }
+    }
+
+    fn wrong(&self, key: &str, from_flag: bool, what: String) -> SettingError {
+        let place = if from_flag {
+            format!("--{}", key.replace('_', "-"))
+        } else {
+            let (file, lines) = &self.scene.render_lines;
+            format!("{}:{}: render.{key}", file.display(), lines.get(key).copied().unwrap_or(1))
+        };
+        SettingError { place, what }
+    }
+
+    fn integer(
+        &self,
+        key: &str,
+        f: impl Fn(&RenderFile) -> Option<i64>,
+        default: i64,
+        low: i64,
+        high: i64,
+    ) -> Result<i64, SettingError> {
+        let (value, from_flag) = self.get(f);
+        let value = value.unwrap_or(default);
+        if (low..=high).contains(&value) {
+            Ok(value)
+        } else {
+            Err(self.wrong(key, from_flag, format!("must lie in {low} to {high}, got {value}")))
+        }
+    }
+
+    fn positive(
+        &self,
+        key: &str,
+        f: impl Fn(&RenderFile) -> Option<f64>,
+        default: f64,
+        high: f64,
+    ) -> Result<f64, SettingError> {
+        let (value, from_flag) = self.get(f);
+        let value = value.unwrap_or(default);
+        if value > 0.0 && value <= high {
+            Ok(value)
+        } else {
+            Err(self.wrong(key, from_flag, format!("must be positive and at most {high}, got {value}")))
+        }
+    }
+
+    fn choice<'s, T: Copy>(
+        &'s self,
+        key: &str,
+        f: impl Fn(&'s RenderFile) -> Option<&'s str>,
+        default: T,
+        all: &[(&str, T)],
+    ) -> Result<T, SettingError> {
+        let (value, from_flag) = self.get(f);
+        let Some(text) = value else { return Ok(default) };
+        all.iter().find(|(n, _)| *n == text).map(|(_, v)| *v).ok_or_else(|| {
+            let names: Vec<_> = all.iter().map(|(n, _)| *n).collect();
+            self.wrong(key, from_flag, format!("must be one of {}, got `{text}`", names.join(", ")))
+        })
+    }
+
+    fn estimator(&self) -> Result<String, SettingError> {
+        let (value, from_flag) = self.get(|f| f.estimator.as_deref());
+        match registry::estimator(value.unwrap_or("integrated")) {
+            Ok(e) => Ok(e.name()),
+            Err(e) => Err(self.wrong("estimator", from_flag, e.what)),
+        }
+    }
+}

@@ -1,0 +1,225 @@
+//! View paths: from the camera, by specular surfaces, to the diffuse surfaces where radiance is estimated.
+
+use crate::estimate::View;
+use crate::math::rgb::{Rgb, mean};
+use crate::math::sequence::Sequence;
+use crate::photons::map::Query;
+use crate::photons::path::{MAX_ANGLE, PathCounts, attenuation};
+use crate::render::direct::{self, Receiver};
+use crate::render::plan::Plan;
+use crate::render::settings::RenderSettings;
+use crate::scene::{Material, Scene};
+use crate::trace::scatter::{SpecularRay, reflected, refracted, specular_weights};
+use crate::trace::{Differential, Intersector, Ray, Surface};
+use glam::Vec3;
+use std::f32::consts::FRAC_1_PI;
+
+/// A diffuse surface at the end of a view path.
+#[derive(Clone, Copy, Debug)]
+pub struct ViewHit {
+    /// What estimators see.
+    pub view: View,
+    /// Radiance at the camera for unit irradiance here: throughput times ρ/π, 1/sr.
+    pub weight: Rgb,
+    /// Index of the pixel in its tile.
+    pub pixel: u32,
+}
+
+/// Counts that only view paths have.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct ViewCounts {
+    /// What was bounded.
+    pub bounded: PathCounts,
+    /// Camera rays that met the inside of a dielectric first.
+    pub camera_inside_glass: u64,
+}
+
+/// What view paths need.
+#[derive(Clone, Copy)]
+pub struct ViewTracer<'a> {
+    /// The scene.
+    pub scene: &'a Scene,
+    /// Its intersector.
+    pub intersector: &'a Intersector,
+    /// The settings.
+    pub settings: &'a RenderSettings,
+    /// The plan.
+    pub plan: &'a Plan,
+}
+
+/// A path that is still to be followed.
+#[derive(Clone, Copy)]
+pub struct Branch {
+    ray: Ray,
+    differential: Differential,
+    throughput: Rgb,
+    depth: u32,
+    specular: u32,
+}
+
+impl ViewTracer<'_> {
+    /// Follows one camera ray. Diffuse hits go to `hits`; what light needs no photons is returned, W/(m² sr).
+    ///
+    /// `sequence` and `index` give the path's numbers: set `1 + depth` decides branches. `stack` is scratch.
+    #[expect(clippy::too_many_arguments, reason = "outputs and scratch that the caller keeps between rays")]
+    pub fn trace(
+        &self,
+        ray: Ray,
+        differential: Differential,
+        sequence: &Sequence,
+        index: u64,
+        pixel: u32,
+        hits: &mut Vec<ViewHit>,
+        stack: &mut Vec<Branch>,
+        counts: &mut ViewCounts,
+    ) -> Rgb {
+        let mut radiance = Rgb::ZERO;
+        stack.clear();
+        stack.push(Branch {
+            ray,
+            differential,
+            throughput: Rgb::ONE,
+            depth: 0,
+            specular: 0,
+        });
+        while let Some(mut branch) = stack.pop() {
+            let Some(hit) = self.intersector.closest(&branch.ray) else {
+                continue;
+            };
+            let surface = Surface::new(self.scene, &branch.ray, &hit);
+            let v = branch.ray.direction;
+            if self.plan.view_differentials {
+                branch.differential = branch.differential.transfer(v, surface.normal, hit.t);
+                let bounded = branch.differential.bound(self.scene.radius, MAX_ANGLE);
+                counts.bounded.differentials += u64::from(bounded);
+            }
+            let material = &self.scene.materials[surface.material as usize];
+            match material {
+                Material::Emitter { radiance: emitted } => {
+                    if surface.front && self.plan.emission {
+                        radiance += branch.throughput * *emitted;
+                    }
+                }
+                Material::Diffuse { .. } => {
+                    let weight =
+                        branch.throughput * material.diffuse_reflectance(surface.uv) * FRAC_1_PI;
+                    if self.plan.shadow_rays {
+                        let receiver = Receiver {
+                            position: surface.position,
+                            normal: surface.normal,
+                        };
+                        radiance += weight
+                            * direct::irradiance(
+                                self.scene,
+                                self.intersector,
+                                &receiver,
+                                self.settings.shadow_rays,
+                                sequence,
+                                index,
+                            );
+                    }
+                    if self.plan.needs_photons() && weight != Rgb::ZERO {
+                        hits.push(ViewHit {
+                            view: View {
+                                query: Query {
+                                    center: surface.position,
+                                    normal: surface.normal,
+                                    axes: branch.differential.dp,
+                                },
+                                direction: v,
+                            },
+                            weight,
+                            pixel,
+                        });
+                    }
+                }
+                _ => {
+                    if !surface.front && branch.depth == 0 && matches!(material, Material::Dielectric { .. }) {
+                        counts.camera_inside_glass += 1;
+                    }
+                    self.scatter(material, &surface, hit.t, branch, sequence, index, stack, counts);
+                }
+            }
+        }
+        radiance
+    }
+
+    /// Sends a path on from a specular surface: both ways at the first hits, one of them after that.
+    #[expect(clippy::too_many_arguments, reason = "the state of a path, spelled out")]
+    fn scatter(
+        &self,
+        material: &Material,
+        surface: &Surface,
+        distance: f32,
+        branch: Branch,
+        sequence: &Sequence,
+        index: u64,
+        stack: &mut Vec<Branch>,
+        counts: &mut ViewCounts,
+    ) {
+        let v = branch.ray.direction;
+        let Some(weights) = specular_weights(material, surface, v) else {
+            return;
+        };
+        if branch.depth + 1 >= self.settings.max_depth {
+            counts.bounded.depth += 1;
+            return;
+        }
+        let throughput = match attenuation(material, surface, distance) {
+            Some(inside) => branch.throughput * inside,
+            None => branch.throughput,
+        };
+        let mut follow = |next: SpecularRay, weight: Rgb| {
+            counts.bounded.horizon += u64::from(next.beyond_horizon);
+            let throughput = throughput * weight;
+            if throughput != Rgb::ZERO {
+                stack.push(Branch {
+                    ray: Ray {
+                        origin: surface.leave(self.scene, next.direction),
+                        direction: next.direction,
+                    },
+                    differential: next.differential,
+                    throughput,
+                    depth: branch.depth + 1,
+                    specular: branch.specular + 1,
+                });
+            }
+        };
+        let reflect = |d: &Differential| reflected(self.scene, surface, v, d);
+        let refract = |d: &Differential| refracted(self.scene, surface, v, d, weights.eta);
+        let d = &branch.differential;
+        let (r, t) = (mean(weights.reflected), mean(weights.refracted));
+        if r > 0.0 && t > 0.0 && branch.specular >= self.settings.split_depth {
+            let chance = r / (r + t);
+            if sequence.four(index, 1 + branch.depth)[0] < chance {
+                follow(reflect(d), weights.reflected / chance);
+            } else {
+                follow(refract(d), weights.refracted / (1.0 - chance));
+            }
+            return;
+        }
+        if t > 0.0 {
+            follow(refract(d), weights.refracted);
+        }
+        if r > 0.0 {
+            follow(reflect(d), weights.reflected);
+        }
+    }
+}
+
+/// Position of a view ray in its pixel: the centre of cell `(i, j)` of `n`×`n`, or a random point of the cell.
+pub fn sample_position(pixel: [u32; 2], cell: [u32; 2], n: u32, jitter: Option<[f32; 2]>) -> (f32, f32) {
+    let [u, v] = jitter.unwrap_or([0.5; 2]);
+    (
+        pixel[0] as f32 + (cell[0] as f32 + u) / n as f32,
+        pixel[1] as f32 + (cell[1] as f32 + v) / n as f32,
+    )
+}
+
+/// The query at a hit without its footprint.
+pub fn at_point(query: &Query) -> Query {
+    Query {
+        axes: [Vec3::ZERO; 2],
+        ..*query
+    }
+}

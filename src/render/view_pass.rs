@@ -1,0 +1,290 @@
+//! The view pass: tile by tile, the same photons under every estimator in turn.
+
+use crate::estimate::{Gathered, Lookup};
+use crate::math::hash::mix;
+use crate::math::rgb::Rgb;
+use crate::math::sequence::{Sampling, Sequence};
+use crate::photons::PhotonMap;
+use crate::photons::kd_tree::Nearest;
+use crate::render::film::Rect;
+use crate::render::photon_pass::PhotonMaps;
+use crate::render::plan::Slot;
+use crate::render::settings::Gather;
+use crate::render::tiles::tiles;
+use crate::render::view::{Branch, ViewCounts, ViewHit, ViewTracer, at_point, sample_position};
+use crate::trace::Ray;
+use glam::DVec3;
+use rayon::prelude::*;
+use std::time::Instant;
+
+/// Seconds of one estimator's view pass by part.
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
+pub struct PartSeconds {
+    /// View rays and shadow rays.
+    pub view_trace: f64,
+    /// Looking photons up.
+    pub gather: f64,
+    /// Evaluating the estimator.
+    pub estimate: f64,
+}
+
+impl PartSeconds {
+    /// All three.
+    pub fn total(&self) -> f64 {
+        self.view_trace + self.gather + self.estimate
+    }
+
+    fn add(&mut self, o: &Self, factor: f64) {
+        self.view_trace += o.view_trace * factor;
+        self.gather += o.gather * factor;
+        self.estimate += o.estimate * factor;
+    }
+}
+
+/// One estimator's part of a tile.
+pub struct TileImage {
+    /// Radiance of its pixels, row by row.
+    pub pixels: Vec<Rgb>,
+    /// Thread seconds.
+    pub seconds: PartSeconds,
+    /// Photons looked at, for all hits.
+    pub gathered: u64,
+}
+
+/// A finished tile.
+pub struct TileResult {
+    /// Where it lies.
+    pub rect: Rect,
+    /// One image for each slot.
+    pub images: Vec<TileImage>,
+    /// Counts of the view paths.
+    pub counts: ViewCounts,
+}
+
+/// What a view pass needs.
+pub struct ViewPass<'a> {
+    /// View paths.
+    pub tracer: ViewTracer<'a>,
+    /// The photons.
+    pub maps: &'a PhotonMaps,
+    /// Number of the pass, from 0; from 1 on rays are jittered.
+    pub pass: u32,
+    /// Area of footprints relative to the first pass.
+    pub area_factor: f32,
+}
+
+/// The result of a view pass over a region.
+pub struct ViewResult {
+    /// Its tiles in order; fewer if cancelled.
+    pub tiles: Vec<TileResult>,
+    /// Wall seconds of each slot, scaled from thread seconds.
+    pub seconds: Vec<PartSeconds>,
+    /// Wall seconds of everything.
+    pub wall: f64,
+    /// Photons looked at by each slot.
+    pub gathered: Vec<u64>,
+    /// Counts of all view paths.
+    pub counts: ViewCounts,
+    /// Whether all tiles are there.
+    pub complete: bool,
+}
+
+/// Buffers that a thread keeps from tile to tile.
+#[derive(Default)]
+struct Scratch {
+    hits: Vec<ViewHit>,
+    stack: Vec<Branch>,
+    indices: Vec<u32>,
+    spans: Vec<(u32, u32, f32)>,
+    heap: Nearest,
+}
+
+impl ViewPass<'_> {
+    /// Renders `region` for every slot. `tile_done` is called for each tile from the thread that made it.
+    pub fn run(
+        &self,
+        region: Rect,
+        slots: &[Slot],
+        cancelled: &(dyn Fn() -> bool + Sync),
+        tile_done: &(dyn Fn() + Sync),
+    ) -> ViewResult {
+        let start = Instant::now();
+        let all = tiles(region);
+        let results: Vec<Option<TileResult>> = all
+            .par_iter()
+            .enumerate()
+            .map_init(Scratch::default, |scratch, (number, rect)| {
+                if cancelled() {
+                    return None;
+                }
+                let tile = self.tile(*rect, number, slots, scratch);
+                tile_done();
+                Some(tile)
+            })
+            .collect();
+        let wall = start.elapsed().as_secs_f64();
+        let tiles: Vec<TileResult> = results.into_iter().flatten().collect();
+        let complete = tiles.len() == all.len();
+        let spent: f64 = tiles
+            .iter()
+            .flat_map(|t| t.images.iter().map(|i| i.seconds.total()))
+            .sum();
+        let scale = if spent > 0.0 { wall / spent } else { 0.0 };
+        let mut seconds = vec![PartSeconds::default(); slots.len()];
+        let mut gathered = vec![0; slots.len()];
+        let mut counts = ViewCounts::default();
+        for tile in &tiles {
+            counts.bounded += tile.counts.bounded;
+            counts.camera_inside_glass += tile.counts.camera_inside_glass;
+            for (i, image) in tile.images.iter().enumerate() {
+                seconds[i].add(&image.seconds, scale);
+                gathered[i] += image.gathered;
+            }
+        }
+        ViewResult {
+            tiles,
+            seconds,
+            wall,
+            gathered,
+            counts,
+            complete,
+        }
+    }
+
+    /// One tile. Slots take turns at being first, so that none always finds the caches cold.
+    fn tile(&self, rect: Rect, number: usize, slots: &[Slot], scratch: &mut Scratch) -> TileResult {
+        let mut counts = ViewCounts::default();
+        let mut images: Vec<Option<TileImage>> = slots.iter().map(|_| None).collect();
+        let mut rays: Vec<u32> = slots.iter().map(|s| s.estimator.rays_per_axis()).collect();
+        rays.sort_unstable();
+        rays.dedup();
+        for n in rays {
+            let start = Instant::now();
+            let base = self.trace(rect, n, scratch, &mut counts);
+            let view_trace = start.elapsed().as_secs_f64();
+            for k in 0..slots.len() {
+                let i = (k + number) % slots.len();
+                if slots[i].estimator.rays_per_axis() == n {
+                    let mut image = self.estimate(&base, n, &slots[i], scratch);
+                    image.seconds.view_trace = view_trace;
+                    images[i] = Some(image);
+                }
+            }
+        }
+        TileResult {
+            rect,
+            // Each slot's number of rays is in the list that was just gone through.
+            images: images.into_iter().flatten().collect(),
+            counts,
+        }
+    }
+
+    /// Traces `n`×`n` rays for each pixel; hits go to the scratch, the sum of other light to the result.
+    fn trace(&self, rect: Rect, n: u32, scratch: &mut Scratch, counts: &mut ViewCounts) -> Vec<Rgb> {
+        let t = &self.tracer;
+        let camera = &t.scene.camera;
+        let size = t.settings.size;
+        let half = 0.5 / n as f32 * self.area_factor.sqrt();
+        let mut base = vec![Rgb::ZERO; (rect.width * rect.height) as usize];
+        scratch.hits.clear();
+        for (pixel, sum) in base.iter_mut().enumerate() {
+            let x = rect.x + pixel as u32 % rect.width;
+            let y = rect.y + pixel as u32 / rect.width;
+            let seed = mix(mix(t.settings.seed, 0x76_6965_7773), u64::from(y) << 32 | u64::from(x));
+            let sequence = Sequence::new(Sampling::Sobol, seed);
+            for cell in 0..n * n {
+                let index = u64::from(self.pass) * u64::from(n * n) + u64::from(cell);
+                let jitter = (self.pass > 0).then(|| {
+                    let x = sequence.four(index, 0);
+                    [x[0], x[1]]
+                });
+                let (px, py) = sample_position([x, y], [cell % n, cell / n], n, jitter);
+                let (direction, differential) = camera.ray(px, py, size, half);
+                let ray = Ray {
+                    origin: camera.position,
+                    direction,
+                };
+                *sum += t.trace(
+                    ray,
+                    differential,
+                    &sequence,
+                    index,
+                    pixel as u32,
+                    &mut scratch.hits,
+                    &mut scratch.stack,
+                    counts,
+                );
+            }
+        }
+        base
+    }
+
+    /// Gathers for all hits of the scratch, then estimates, each timed as a whole.
+    fn estimate(&self, base: &[Rgb], n: u32, slot: &Slot, scratch: &mut Scratch) -> TileImage {
+        let start = Instant::now();
+        scratch.indices.clear();
+        scratch.spans.clear();
+        for hit in 0..scratch.hits.len() {
+            for map in self.maps.all() {
+                let first = scratch.indices.len() as u32;
+                let radius = self.gather(map, slot, hit, scratch);
+                scratch.spans.push((first, scratch.indices.len() as u32, radius));
+            }
+        }
+        let gather = start.elapsed().as_secs_f64();
+
+        let start = Instant::now();
+        let mut sums: Vec<DVec3> = base.iter().map(|b| b.as_dvec3()).collect();
+        let mut spans = scratch.spans.iter();
+        for hit in &scratch.hits {
+            let mut irradiance = Rgb::ZERO;
+            for (map, &(from, to, radius)) in self.maps.all().zip(spans.by_ref()) {
+                let gathered = Gathered {
+                    photons: map.photons(),
+                    indices: &scratch.indices[from as usize..to as usize],
+                    radius,
+                };
+                irradiance += slot.estimator.irradiance(&gathered, &hit.view);
+            }
+            sums[hit.pixel as usize] += (irradiance * hit.weight).as_dvec3();
+        }
+        let scale = 1.0 / f64::from(n * n);
+        let pixels = sums.into_iter().map(|s| finite(s * scale)).collect();
+        let estimate = start.elapsed().as_secs_f64();
+        TileImage {
+            pixels,
+            seconds: PartSeconds {
+                view_trace: 0.0,
+                gather,
+                estimate,
+            },
+            gathered: scratch.indices.len() as u64,
+        }
+    }
+
+    /// Appends the photons of one hit to the scratch's indices; returns the radius of the disc, if it asks for one.
+    fn gather(&self, map: &PhotonMap, slot: &Slot, hit: usize, scratch: &mut Scratch) -> f32 {
+        let query = scratch.hits[hit].view.query;
+        let (indices, heap) = (&mut scratch.indices, &mut scratch.heap);
+        let k = self.tracer.settings.k;
+        match (slot.estimator.lookup(), slot.gather) {
+            (Lookup::Disc, _) => {
+                map.nearest_anywhere(&query, k, heap);
+                let Some(&(bits, _)) = heap.peek() else { return 0.0 };
+                indices.extend(heap.iter().map(|(_, i)| *i));
+                let radius = (f32::from_bits(bits) * self.area_factor).sqrt();
+                return radius.max(self.tracer.scene.resolution());
+            }
+            (Lookup::Point, Gather::Overlap) => map.overlapping_point(&query, indices),
+            (Lookup::Parallelogram, Gather::Overlap) => map.overlapping_parallelogram(&query, indices),
+            (Lookup::Point, Gather::Knn) => map.nearest(&at_point(&query), k, heap, indices),
+            (Lookup::Parallelogram, Gather::Knn) => map.nearest(&query, k, heap, indices),
+        }
+        0.0
+    }
+}
+
+/// Sums beyond f32 become its largest number, so that no infinity reaches an image.
+fn finite(sum: DVec3) -> Rgb {
+    sum.clamp(DVec3::ZERO, DVec3::splat(f64::from(f32::MAX))).as_vec3()
+}
