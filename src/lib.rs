@@ -14,3 +14,6 @@ pub mod render;
 
 
 
+pub mod measure;
+pub mod export;
+pub mod cli;

@@ -1,3 +1,5 @@
 //! The `cusp` binary: a thin shell over the library.
 
-fn main() {}
+fn main() -> std::process::ExitCode {
+    cusp::cli::main(std::env::args_os())
+}

@@ -1,1 +1,113 @@
+//! The command line: one file for each command.
 
+pub mod compare;
+pub mod failure;
+pub mod flags;
+pub mod lists;
+pub mod progress;
+pub mod render;
+pub mod table;
+
+use clap::{Parser, Subcommand};
+use failure::Failure;
+use flags::CommonFlags;
+use std::ffi::OsString;
+use std::process::ExitCode;
+
+/// A workbench for photon differentials: what each radiance estimator makes of the same photons.
+#[derive(Debug, Parser)]
+#[command(name = "cusp", version, about, args_conflicts_with_subcommands = true, max_term_width = 110)]
+struct Cli {
+    #[command(subcommand)]
+    command: Option<Command>,
+    /// Scene to compare estimators on: a built-in name, a .toml or an .obj
+    scene: Option<String>,
+    #[command(flatten)]
+    flags: CommonFlags,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Estimators side by side: sheet.png, crops, images (EXR and PNG), timings.csv, report.json
+    Compare(compare::CompareArgs),
+    /// One estimator, one image
+    Render(render::RenderArgs),
+    /// The built-in scenes
+    Scenes(lists::ListArgs),
+    /// The estimators and their settings
+    Estimators(lists::ListArgs),
+}
+
+/// Runs the program on its arguments (the first is the program's name) and says how it ended:
+/// 0 done, 1 the work failed, 2 the call was wrong, 130 interrupted.
+pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
+    let cli = match Cli::try_parse_from(args) {
+        Ok(cli) => cli,
+        Err(e) if e.use_stderr() => {
+            eprintln!("cusp: {}", one_line(&e));
+            return ExitCode::from(2);
+        }
+        Err(help) => {
+            // Help or version; a closed pipe is not a failure.
+            let _ = help.print();
+            return ExitCode::SUCCESS;
+        }
+    };
+    let result = match cli.command {
+        Some(Command::Compare(args)) => compare::run(&args),
+        Some(Command::Render(args)) => render::run(&args),
+        Some(Command::Scenes(args)) => lists::scenes(&args),
+        Some(Command::Estimators(args)) => lists::estimators(&args),
+        None => {
+            let scene = cli.scene.unwrap_or_else(|| "ring".into());
+            if !cli.flags.quiet && !cli.flags.json {
+                eprintln!("There is no window yet: comparing the estimators on {scene}.");
+            }
+            compare::run(&compare::CompareArgs::of(scene, cli.flags))
+        }
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            eprintln!("cusp: {failure}");
+            ExitCode::from(failure.code())
+        }
+    }
+}
+
+/// The first paragraph of a parser's complaint as one line, and where to read more.
+fn one_line(error: &clap::Error) -> String {
+    let text = error.to_string();
+    let what: Vec<&str> = text
+        .lines()
+        .map(str::trim)
+        .take_while(|l| !l.starts_with("Usage:") && !l.starts_with("For more"))
+        .filter(|l| !l.is_empty())
+        .collect();
+    let what = what.join(" ");
+    format!("{}; see `cusp --help`", what.strip_prefix("error: ").unwrap_or(&what))
+}
+
+/// Writes text to standard output; a reader that has gone away is no failure.
+///
+/// # Errors
+/// Anything else that the system refuses.
+fn print(text: &str) -> Result<(), Failure> {
+    use std::io::Write;
+    match std::io::stdout().write_all(text.as_bytes()) {
+        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => {
+            Err(Failure::Work(format!("standard output: {e}")))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// A value as indented JSON with a line end.
+///
+/// # Errors
+/// A value that JSON cannot hold, which would be a defect.
+fn to_json<T: serde::Serialize>(value: &T) -> Result<String, Failure> {
+    serde_json::to_string_pretty(value)
+        .map(|s| s + "\n")
+        .map_err(|e| Failure::Work(format!("JSON: {e}")))
+}

@@ -1,1 +1,12 @@
+//! Files: images, crops, sheets, tables and reports, written whole or not at all.
 
+pub mod exr_file;
+pub mod png_file;
+pub mod provenance;
+pub mod report;
+pub mod sheet;
+pub mod text;
+pub mod tone;
+pub mod whole_file;
+
+pub use provenance::Provenance;

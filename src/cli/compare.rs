@@ -1,0 +1,522 @@
+//! `cusp compare`: estimators side by side on the same photons.
+
+use crate::cli::failure::Failure;
+use crate::cli::flags::{CommonFlags, rect};
+use crate::cli::progress::{bar, interrupted, listen_for_interrupts};
+use crate::cli::table::{Table, percent};
+use crate::cli::{print, to_json};
+use crate::estimate::Estimator;
+use crate::estimate::registry::{self, ESTIMATORS};
+use crate::estimate::regular::Regular;
+use crate::export::report::{CompareReport, EstimatorReport, EstimatorSeconds, PlanCost, RenderReport};
+use crate::export::sheet::{self, Column, PALETTE, Sheet};
+use crate::export::tone::{auto_exposure, to_srgb};
+use crate::export::{Provenance, exr_file, png_file, whole_file};
+use crate::measure::metrics::{Mask, compare};
+use crate::measure::{ErrorMetrics, Reference};
+use crate::photons::map::MapParts;
+use crate::render::film::{Image, Rect};
+use crate::render::photon_pass::PhotonMaps;
+use crate::render::plan::Slot;
+use crate::render::renderer::{Step, Watch};
+use crate::render::settings::{Gather, LightPart, PlanMode};
+use crate::render::tiles::tiles;
+use crate::render::{Plan, Renderer};
+use crate::scene::open;
+use clap::{Args, ValueEnum};
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// View rays along a pixel's side in the truth that estimators are compared with.
+const TRUTH_RAYS: u32 = 16;
+/// Largest crop that is chosen by default.
+const CROP: [u32; 2] = [128, 96];
+
+/// Flags of `compare`.
+#[derive(Debug, Args)]
+pub struct CompareArgs {
+    /// A built-in name, a .toml or an .obj
+    scene: String,
+    /// Estimators, separated by commas; all with their defaults if left out
+    #[arg(long, value_name = "A,B")]
+    estimators: Option<String>,
+    /// Part to enlarge: x,y,width,height; where the picture changes most, if left out
+    #[arg(long, value_name = "X,Y,W,H", value_parser = rect)]
+    crop: Option<Rect>,
+    /// Factor of enlargement, without smoothing
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=32))]
+    enlarge: u32,
+    /// Where errors are taken against regular with 16×16 view rays
+    #[arg(long, value_enum, default_value = "crop")]
+    truth: Truth,
+    /// Image to compare with (EXR or PNG), instead of a built-in scene's own
+    #[arg(long, value_name = "R.exr")]
+    reference: Option<PathBuf>,
+    /// Pixels of the reference that count (PNG, white)
+    #[arg(long, value_name = "M.png", requires = "reference")]
+    mask: Option<PathBuf>,
+    #[command(flatten)]
+    flags: CommonFlags,
+}
+
+/// `--truth`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+enum Truth {
+    /// In the crop.
+    #[default]
+    Crop,
+    /// In the whole image.
+    Full,
+    /// Nowhere.
+    None,
+}
+
+impl CompareArgs {
+    /// The comparison of a scene at its defaults.
+    pub fn of(scene: String, flags: CommonFlags) -> Self {
+        Self {
+            scene,
+            estimators: None,
+            crop: None,
+            enlarge: 3,
+            truth: Truth::Crop,
+            reference: None,
+            mask: None,
+            flags,
+        }
+    }
+}
+
+/// Compares.
+///
+/// # Errors
+/// A wrong call, a file that cannot be written, or an interruption.
+pub fn run(args: &CompareArgs) -> Result<(), Failure> {
+    listen_for_interrupts();
+    args.flags.on_threads(|| Comparison::prepare(args)?.run())
+}
+
+struct Comparison<'a> {
+    args: &'a CompareArgs,
+    renderer: Renderer,
+    reference: Option<Reference>,
+    start: Instant,
+    load: f64,
+}
+
+impl<'a> Comparison<'a> {
+    /// Reads and checks everything that can be wrong before any work is done.
+    fn prepare(args: &'a CompareArgs) -> Result<Self, Failure> {
+        let start = Instant::now();
+        let scene = open(&args.scene)?;
+        let settings = args.flags.settings(&scene)?;
+        let estimators = match (&args.estimators, &args.flags.estimator) {
+            (Some(list), _) | (None, Some(list)) => registry::estimators(list)?,
+            (None, None) => ESTIMATORS.iter().filter_map(|e| e.default_estimator()).collect(),
+        };
+        if let Some(c) = args.crop {
+            let fits = |at: u32, length: u32, size: u32| u64::from(at) + u64::from(length) <= u64::from(size);
+            let [w, h] = settings.size;
+            if !fits(c.x, c.width, w) || !fits(c.y, c.height, h) {
+                return Err(Failure::Call(format!("--crop: leaves the image of {w}x{h} pixels")));
+            }
+        }
+        let reference = match &args.reference {
+            Some(path) => Some(Reference::from_files(path, args.mask.as_deref()).map_err(Failure::Call)?),
+            None => Reference::built_in(&args.scene).map_err(Failure::Work)?,
+        };
+        // A reference shows all light; of any other there is no error to speak of.
+        let reference = reference.filter(|_| settings.light == LightPart::All);
+        if let (Some(r), true) = (&reference, args.reference.is_some()) {
+            r.error_of(&Image::black(settings.size)).map_err(|e| Failure::Call(format!("--reference: {e}")))?;
+        }
+        let load = start.elapsed().as_secs_f64();
+        Ok(Self {
+            args,
+            renderer: Renderer::new(scene, settings, estimators),
+            reference,
+            start,
+            load,
+        })
+    }
+
+    fn run(mut self) -> Result<(), Failure> {
+        let hidden = self.args.flags.quiet || self.args.flags.json;
+        let steps = tiles(Rect::whole(self.renderer.settings().size)).len() as u64;
+        let progress = bar(steps, "estimators", hidden);
+        let step = self.renderer.step(&Watch {
+            cancelled: &interrupted,
+            tile_done: &|| progress.inc(1),
+        });
+        progress.finish_and_clear();
+        if step == Step::Cancelled {
+            return Err(Failure::Interrupted("nothing was written".into()));
+        }
+        let images: Vec<Image> = self.renderer.films().iter().map(|f| f.image()).collect();
+        let crop = self.args.crop.unwrap_or_else(|| busiest(self.base_for_crop(&images), CROP));
+        let truth = self.truth(crop, hidden);
+        let plan_cost = if interrupted() { None } else { self.plan_cost() };
+        let names = file_names(self.renderer.estimators());
+        let report = self.report(&images, crop, truth.as_ref(), plan_cost, &names);
+        let folder = self.args.flags.out.clone().unwrap_or_else(|| {
+            Path::new("cusp-out").join(format!("compare-{}", file_stem(&self.renderer.scene().name)))
+        });
+        self.write(&folder, &images, crop, truth.as_ref(), &report, &names)?;
+        if self.args.flags.json {
+            print(&to_json(&report)?)?;
+        } else if !self.args.flags.quiet {
+            for warning in &report.render.warnings {
+                eprintln!("warning: {warning}");
+            }
+            print(&text(&report, &folder))?;
+        }
+        if interrupted() {
+            return Err(Failure::Interrupted(format!("what was done is in {}", folder.display())));
+        }
+        Ok(())
+    }
+
+    /// The image in which the default crop is looked for: the last consistent estimator's, which is the smoothest.
+    fn base_for_crop<'i>(&self, images: &'i [Image]) -> &'i Image {
+        let at = self.renderer.estimators().iter().rposition(|e| e.is_consistent());
+        &images[at.unwrap_or(0)]
+    }
+
+    /// `regular` with 16×16 view rays and full overlap on the photons of the pass; None if not asked for or stopped.
+    fn truth(&self, crop: Rect, hidden: bool) -> Option<(Rect, Image)> {
+        let region = match self.args.truth {
+            Truth::None => return None,
+            Truth::Crop => crop,
+            Truth::Full => Rect::whole(self.renderer.settings().size),
+        };
+        let (photons, maps) = self.renderer.last_pass()?;
+        let parts = MapParts { kd_tree: false, overlap: true };
+        let own;
+        let maps = if self.renderer.plan().overlap {
+            maps
+        } else {
+            let scale = self.renderer.settings().footprint_scale;
+            own = PhotonMaps::with_parts(self.renderer.scene(), self.renderer.plan(), &photons.stored, scale, parts);
+            &own
+        };
+        let regular = Regular::with_rays(TRUTH_RAYS);
+        let slot = Slot { estimator: &regular, gather: Gather::Overlap };
+        let progress = bar(tiles(region).len() as u64, "truth", hidden);
+        let mut pass = self.renderer.view_pass(maps, 0);
+        pass.area_factor = 1.0;
+        let result = pass.run(region, &[slot], &interrupted, &|| progress.inc(1));
+        progress.finish_and_clear();
+        result.complete.then(|| {
+            let mut image = Image::black([region.width, region.height]);
+            for tile in &result.tiles {
+                let r = tile.rect;
+                for (i, p) in tile.images[0].pixels.iter().enumerate() {
+                    let (x, y) = (r.x - region.x + i as u32 % r.width, r.y - region.y + i as u32 / r.width);
+                    image.pixels[(y * region.width + x) as usize] = *p;
+                }
+            }
+            (region, image)
+        })
+    }
+
+    /// Photon pass and maps once more, with the plan and with everything forced on.
+    fn plan_cost(&self) -> Option<PlanCost> {
+        let r = &self.renderer;
+        let mut settings = r.settings().clone();
+        settings.plan = PlanMode::Full;
+        let slots = crate::render::renderer::slots(r.estimators(), settings.gather);
+        let full = Plan::new(r.scene(), r.intersector(), &settings, &slots);
+        let timed = |plan: &Plan| {
+            let start = Instant::now();
+            let photons = if plan.needs_photons() {
+                r.emitter(plan).run(0, &interrupted)
+            } else {
+                Default::default()
+            };
+            let maps = PhotonMaps::new(r.scene(), plan, &photons.stored, settings.footprint_scale);
+            let stored: usize = maps.all().map(|m| m.photons().len()).sum();
+            (start.elapsed().as_secs_f64(), stored as u64)
+        };
+        let (needed_seconds, needed_stored) = timed(r.plan());
+        let (full_seconds, full_stored) = timed(&full);
+        (!interrupted()).then_some(PlanCost { needed_seconds, full_seconds, needed_stored, full_stored })
+    }
+
+    fn report(
+        &self,
+        images: &[Image],
+        crop: Rect,
+        truth: Option<&(Rect, Image)>,
+        plan_cost: Option<PlanCost>,
+        names: &[String],
+    ) -> CompareReport {
+        let r = &self.renderer;
+        let [w, h] = r.settings().size;
+        let regular = r
+            .estimators()
+            .iter()
+            .position(|e| e.id() == "regular")
+            .map(|i| r.estimator_seconds()[i].total());
+        let estimators = r.estimators().iter().enumerate().map(|(i, e)| {
+            let parts = r.estimator_seconds()[i];
+            let error = |image: Option<ErrorMetrics>| image;
+            EstimatorReport {
+                id: e.id().into(),
+                settings: e.settings(),
+                seconds: EstimatorSeconds { parts, view_pass: parts.total() },
+                ratio_to_regular: regular.filter(|&s| s > 0.0).map(|s| parts.total() / s),
+                photons_per_pixel: r.gathered()[i] as f64 / (f64::from(w) * f64::from(h)),
+                error: error(truth.and_then(|(region, t)| {
+                    compare(&images[i].crop(*region), t, &Mask::all(t.size)).ok()
+                })),
+                reference_error: self.reference.as_ref().and_then(|x| x.error_of(&images[i]).ok()),
+                files: [".exr", ".png", "_crop.exr", "_crop.png"].map(|s| format!("{}{s}", names[i])).into(),
+            }
+        });
+        let estimators: Vec<_> = estimators.collect();
+        let first = estimators.first().map_or(String::new(), |e| e.id.clone());
+        CompareReport {
+            render: RenderReport::new(r, first, self.load, self.start.elapsed().as_secs_f64()),
+            crop,
+            truth: truth.map(|t| t.0),
+            reference: self.reference.as_ref().map(|r| r.source.clone()),
+            plan_cost,
+            estimators,
+        }
+    }
+
+    fn write(
+        &self,
+        folder: &Path,
+        images: &[Image],
+        crop: Rect,
+        truth: Option<&(Rect, Image)>,
+        report: &CompareReport,
+        names: &[String],
+    ) -> Result<(), Failure> {
+        let provenance = Provenance::new(self.renderer.scene(), self.renderer.settings().seed);
+        let exposure = auto_exposure(self.base_for_crop(images));
+        let both = |name: &str, image: &Image, enlarge: u32| -> Result<(), Failure> {
+            exr_file::write(&folder.join(format!("{name}.exr")), image, &provenance)?;
+            let mut canvas = crate::export::text::Canvas::new([image.size[0] * enlarge, image.size[1] * enlarge], [0; 3]);
+            canvas.paste(0, 0, image.size, &to_srgb(image, exposure), enlarge);
+            png_file::write(&folder.join(format!("{name}.png")), canvas.size, &canvas.rgb, &provenance)?;
+            Ok(())
+        };
+        for (name, image) in names.iter().zip(images) {
+            both(name, image, 1)?;
+            both(&format!("{name}_crop"), &image.crop(crop), self.args.enlarge)?;
+        }
+        if let Some((_, image)) = truth {
+            both("truth", image, if self.args.truth == Truth::Crop { self.args.enlarge } else { 1 })?;
+        }
+        let sheet = sheet::draw(&self.sheet(images, crop, truth, report, exposure));
+        png_file::write(&folder.join("sheet.png"), sheet.size, &sheet.rgb, &provenance)?;
+        whole_file::write(&folder.join("timings.csv"), report.timings_csv().as_bytes())?;
+        whole_file::write(&folder.join("report.json"), to_json(report)?.as_bytes())?;
+        Ok(())
+    }
+
+    fn sheet(
+        &self,
+        images: &[Image],
+        crop: Rect,
+        truth: Option<&(Rect, Image)>,
+        report: &CompareReport,
+        exposure: f32,
+    ) -> Sheet {
+        let r = &report.render;
+        let columns = report.estimators.iter().zip(images).enumerate().map(|(i, (e, image))| Column {
+            title: if e.settings.is_empty() { e.id.clone() } else { format!("{}:{}", e.id, e.settings) },
+            lines: vec![
+                format!(
+                    "{:.3} s{}",
+                    e.seconds.view_pass,
+                    e.ratio_to_regular.map_or(String::new(), |x| format!(", {x:.2} x regular"))
+                ),
+                e.error.map_or(String::new(), |m| format!("error {}", percent(Some(m.relative_rmse)))),
+                e.reference_error.map_or(String::new(), |m| format!("to reference {}", percent(Some(m.relative_rmse)))),
+            ],
+            color: PALETTE[i % PALETTE.len()],
+            image: image.clone(),
+            error: truth.map(|(region, t)| {
+                // A full truth is cut to the crop.
+                let t = if *region == crop { t.clone() } else { t.crop(crop) };
+                signed_error(&image.crop(crop), &t)
+            }),
+        });
+        Sheet {
+            title: format!("{}: radiance estimators on the same photons", r.provenance.scene),
+            subtitle: format!(
+                "{}x{} pixels, {} photons emitted, {} caustic and {} global stored, {}, footprint scale {}, seed {}",
+                r.size[0], r.size[1], r.photons_emitted, r.photons_stored.caustic, r.photons_stored.global,
+                match r.gather {
+                    Gather::Knn => format!("the {} nearest gathered", r.settings.k),
+                    Gather::Overlap => "gathered by overlap".into(),
+                },
+                r.settings.footprint_scale, r.provenance.seed
+            ),
+            columns: columns.collect(),
+            crop,
+            enlarge: self.args.enlarge,
+            exposure,
+        }
+    }
+}
+
+/// Error over the truth's mean.
+fn signed_error(image: &Image, truth: &Image) -> Image {
+    let mean = truth.pixels.iter().map(|p| crate::math::rgb::mean(*p)).sum::<f32>() / truth.pixels.len().max(1) as f32;
+    let scale = if mean > 0.0 { 1.0 / mean } else { 0.0 };
+    Image {
+        size: image.size,
+        pixels: image.pixels.iter().zip(&truth.pixels).map(|(x, t)| (*x - *t) * scale).collect(),
+    }
+}
+
+/// The window of that size, or of the image's, over which the logarithm of the radiance changes most.
+fn busiest(image: &Image, size: [u32; 2]) -> Rect {
+    let [w, h] = image.size;
+    let (width, height) = (size[0].min(w), size[1].min(h));
+    let mean = image.pixels.iter().map(|p| crate::math::rgb::luminance(*p)).sum::<f32>() / image.pixels.len() as f32;
+    // Compressed, so that one bright spot does not outweigh a long contour.
+    let value = |x: u32, y: u32| {
+        let l = crate::math::rgb::luminance(image.at(x, y));
+        f64::from(l / (l + mean.max(f32::MIN_POSITIVE)))
+    };
+    // Sums over rectangles from the corner.
+    let mut table = vec![0.0f64; ((w + 1) * (h + 1)) as usize];
+    let at = |x: u32, y: u32| (y * (w + 1) + x) as usize;
+    for y in 0..h {
+        for x in 0..w {
+            let v = value(x, y);
+            let dx = value((x + 1).min(w - 1), y) - v;
+            let dy = value(x, (y + 1).min(h - 1)) - v;
+            table[at(x + 1, y + 1)] = (dx * dx + dy * dy).sqrt() + table[at(x, y + 1)] + table[at(x + 1, y)] - table[at(x, y)];
+        }
+    }
+    let mut best = (f64::NEG_INFINITY, 0, 0);
+    for y in (0..=h - height).step_by(4) {
+        for x in (0..=w - width).step_by(4) {
+            let sum = table[at(x + width, y + height)] - table[at(x, y + height)] - table[at(x + width, y)] + table[at(x, y)];
+            if sum > best.0 {
+                best = (sum, x, y);
+            }
+        }
+    }
+    Rect { x: best.1, y: best.2, width, height }
+}
+
+/// File names: ids, with settings where two would be the same.
+fn file_names(estimators: &[Box<dyn Estimator>]) -> Vec<String> {
+    let mut taken = BTreeSet::new();
+    estimators
+        .iter()
+        .map(|e| {
+            let alone = estimators.iter().filter(|o| o.id() == e.id()).count() == 1;
+            let base = file_stem(&if alone { e.id().to_owned() } else { e.name() });
+            let mut name = base.clone();
+            let mut n = 2;
+            while !taken.insert(name.clone()) {
+                name = format!("{base}-{n}");
+                n += 1;
+            }
+            name
+        })
+        .collect()
+}
+
+/// Letters, digits and a few signs; anything else becomes a hyphen.
+fn file_stem(name: &str) -> String {
+    name.chars()
+        .map(|c| if c.is_ascii_alphanumeric() || "._-".contains(c) { c } else { '-' })
+        .collect()
+}
+
+/// The table for people.
+fn text(report: &CompareReport, folder: &Path) -> String {
+    let r = &report.render;
+    let stored = &r.photons_stored;
+    let seconds = |s: f64| format!("{s:.3}");
+    let mut table = Table::new([
+        "estimator", "view pass s", "view rays s", "gather s", "estimate s", "x regular", "photons/pixel", "error", "to reference",
+    ]);
+    for e in &report.estimators {
+        let name = if e.settings.is_empty() { e.id.clone() } else { format!("{}:{}", e.id, e.settings) };
+        table.row([
+            name,
+            seconds(e.seconds.view_pass),
+            seconds(e.seconds.parts.view_trace),
+            seconds(e.seconds.parts.gather),
+            seconds(e.seconds.parts.estimate),
+            e.ratio_to_regular.map_or("-".into(), |x| format!("{x:.2}")),
+            format!("{:.1}", e.photons_per_pixel),
+            percent(e.error.map(|e| e.relative_rmse)),
+            percent(e.reference_error.map(|e| e.relative_rmse)),
+        ]);
+    }
+    let c = report.crop;
+    let mut out = format!(
+        "{}: {}x{}, {} photons emitted, stored {} direct, {} caustic, {} global; photons {:.3} s, maps {:.3} s\n\n{}\n",
+        r.provenance.scene, r.size[0], r.size[1], r.photons_emitted, stored.direct, stored.caustic, stored.global,
+        r.seconds.photon_trace, r.seconds.map_build, table.text()
+    );
+    let place = match report.truth {
+        Some(t) if t == c => format!("the crop {},{},{},{}", c.x, c.y, c.width, c.height),
+        Some(_) => "the whole image".into(),
+        None => String::new(),
+    };
+    if !place.is_empty() {
+        out.push_str(&format!(
+            "error: relative RMSE over {place} against regular with {TRUTH_RAYS}x{TRUTH_RAYS} view rays on the same photons, all that overlap\n"
+        ));
+    }
+    if let Some(reference) = &report.reference {
+        out.push_str(&format!("to reference: relative RMSE of one pass against the {reference}\n"));
+    }
+    out.push_str("\nplan\n");
+    let width = r.plan.items.iter().map(|i| i.part.len()).max().unwrap_or(0);
+    for item in &r.plan.items {
+        out.push_str(&format!("  {:<width$}  {:<8}  {}\n", item.part, if item.on { "on" } else { "left out" }, item.why));
+    }
+    if let Some(cost) = &report.plan_cost {
+        out.push_str(&format!(
+            "  photons and maps: {:.3} s and {} stored as planned; {:.3} s and {} stored with every part on ({:.2} x)\n",
+            cost.needed_seconds, cost.needed_stored, cost.full_seconds, cost.full_stored,
+            if cost.needed_seconds > 0.0 { cost.full_seconds / cost.needed_seconds } else { 1.0 }
+        ));
+    }
+    out.push_str(&format!("\n{:.1} s in all; files in {}\n", r.seconds.total, folder.display()));
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::Vec3;
+
+    #[test]
+    fn the_busiest_window_holds_the_contour() {
+        let mut image = Image::black([256, 200]);
+        for y in 0..200 {
+            for x in 0..256 {
+                if (x as i32 - 180).pow(2) + (y as i32 - 120).pow(2) < 900 {
+                    image.pixels[y * 256 + x] = Vec3::ONE;
+                }
+            }
+        }
+        let r = busiest(&image, [64, 64]);
+        assert!(r.x <= 150 && r.x + 64 >= 210 && r.y <= 90 && r.y + 64 >= 150, "{r:?}");
+        assert_eq!(busiest(&Image::black([10, 5]), [64, 64]), Rect { x: 0, y: 0, width: 10, height: 5 });
+    }
+
+    #[test]
+    fn file_names_are_told_apart() {
+        let list = registry::estimators("regular,multi_sampled:n=2,multi_sampled:n=4,multi_sampled:n=4").expect("parses");
+        assert_eq!(
+            file_names(&list),
+            ["regular", "multi_sampled-n-2-grid-closed", "multi_sampled-n-4-grid-closed", "multi_sampled-n-4-grid-closed-2"]
+        );
+    }
+}

@@ -1,0 +1,177 @@
+//! Flags that several commands share.
+
+use crate::cli::failure::Failure;
+use crate::render::film::Rect;
+use crate::render::settings::{PlanMode, RenderSettings};
+use crate::scene::Scene;
+use crate::scene::scene_file::RenderFile;
+use clap::{Args, ValueEnum};
+use std::path::PathBuf;
+
+/// Flags of the same name and meaning in every command that renders.
+#[derive(Clone, Debug, Default, Args)]
+pub struct CommonFlags {
+    /// Estimator with its settings, as in multi_sampled:n=8,grid=cells
+    #[arg(long, value_name = "E")]
+    pub estimator: Option<String>,
+    /// How photons are looked up: overlap (by footprint) or knn (k nearest)
+    #[arg(long, value_name = "G")]
+    pub gather: Option<String>,
+    /// Photons that knn and density look up in each map
+    #[arg(long, value_name = "K", value_parser = count, allow_negative_numbers = true)]
+    pub k: Option<i64>,
+    /// Photons emitted per pass (1e5 is fine)
+    #[arg(long, value_name = "N", value_parser = count, allow_negative_numbers = true)]
+    pub photons: Option<i64>,
+    /// Factor on the axes of all photon footprints
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
+    pub footprint_scale: Option<f64>,
+    /// Light to show: all, direct, caustic or global
+    #[arg(long, value_name = "L")]
+    pub light: Option<String>,
+    /// Final gathering: none
+    #[arg(long, value_name = "M")]
+    pub final_gather: Option<String>,
+    /// Where direct light comes from: shadow_rays or photons
+    #[arg(long, value_name = "D")]
+    pub direct: Option<String>,
+    /// Shadow rays to each light with area, for each view hit
+    #[arg(long, value_name = "N", value_parser = count, allow_negative_numbers = true)]
+    pub shadow_rays: Option<i64>,
+    /// Numbers that photons are made of: sobol or random
+    #[arg(long, value_name = "KIND")]
+    pub sampling: Option<String>,
+    /// Rule for footprints at diffuse bounces: polar or as_published
+    #[arg(long, value_name = "RULE")]
+    pub diffuse_spread: Option<String>,
+    /// Surfaces that a path may meet
+    #[arg(long, value_name = "N", value_parser = count, allow_negative_numbers = true)]
+    pub max_depth: Option<i64>,
+    /// Specular view hits at which both branches are followed
+    #[arg(long, value_name = "N", value_parser = count, allow_negative_numbers = true)]
+    pub split_depth: Option<i64>,
+    /// Parts that the scene does not need: left out (needed) or forced on (full)
+    #[arg(long, value_name = "PLAN", value_enum, default_value = "needed")]
+    pub plan: PlanFlag,
+    /// Size of the image in pixels, instead of the scene's
+    #[arg(long, value_name = "WxH", value_parser = size)]
+    pub size: Option<[u32; 2]>,
+    /// Seed of everything random
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub seed: u64,
+    /// Threads; all cores if left out
+    #[arg(long, value_name = "T")]
+    pub threads: Option<usize>,
+    /// Folder for files
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Print JSON instead of a table
+    #[arg(long)]
+    pub json: bool,
+    /// Print nothing but errors
+    #[arg(long)]
+    pub quiet: bool,
+}
+
+/// `--plan`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum PlanFlag {
+    /// Leave out what is not needed.
+    #[default]
+    Needed,
+    /// Force every part on.
+    Full,
+}
+
+impl CommonFlags {
+    /// The scene's settings with these flags on top.
+    ///
+    /// # Errors
+    /// A value out of range.
+    pub fn settings(&self, scene: &Scene) -> Result<RenderSettings, Failure> {
+        let flags = RenderFile {
+            photons: self.photons,
+            estimator: self.estimator.clone(),
+            gather: self.gather.clone(),
+            k: self.k,
+            footprint_scale: self.footprint_scale,
+            max_depth: self.max_depth,
+            split_depth: self.split_depth,
+            final_gather: self.final_gather.clone(),
+            light: self.light.clone(),
+            direct: self.direct.clone(),
+            shadow_rays: self.shadow_rays,
+            sampling: self.sampling.clone(),
+            diffuse_spread: self.diffuse_spread.clone(),
+        };
+        let mut settings = RenderSettings::new(scene, &flags, self.size, self.seed)?;
+        settings.plan = match self.plan {
+            PlanFlag::Needed => PlanMode::Needed,
+            PlanFlag::Full => PlanMode::Full,
+        };
+        Ok(settings)
+    }
+
+    /// Runs `work` on as many threads as asked for.
+    ///
+    /// # Errors
+    /// A number of threads that can't be, or what `work` returns.
+    pub fn on_threads<T: Send>(&self, work: impl FnOnce() -> Result<T, Failure> + Send) -> Result<T, Failure> {
+        match self.threads {
+            None => work(),
+            Some(n @ 1..=1024) => rayon::ThreadPoolBuilder::new()
+                .num_threads(n)
+                .build()
+                .map_err(|e| Failure::Work(format!("--threads {n}: {e}")))?
+                .install(work),
+            Some(n) => Err(Failure::Call(format!("--threads: must lie in 1 to 1024, got {n}"))),
+        }
+    }
+}
+
+/// A whole number, as in `200000` or `2e5`.
+fn count(text: &str) -> Result<i64, String> {
+    if let Ok(n) = text.parse() {
+        return Ok(n);
+    }
+    match text.parse::<f64>() {
+        Ok(x) if x.fract() == 0.0 && x.abs() < 1e15 => Ok(x as i64),
+        _ => Err("not a whole number".into()),
+    }
+}
+
+/// `WxH`.
+fn size(text: &str) -> Result<[u32; 2], String> {
+    let wrong = || "write WIDTHxHEIGHT, as in 512x512".to_owned();
+    let (w, h) = text.split_once(['x', 'X']).ok_or_else(wrong)?;
+    let side = |s: &str| s.parse::<u32>().map_err(|_| wrong());
+    Ok([side(w)?, side(h)?])
+}
+
+/// `x,y,w,h`.
+///
+/// # Errors
+/// A text that is no rectangle with an area.
+pub fn rect(text: &str) -> Result<Rect, String> {
+    let numbers: Result<Vec<u32>, _> = text.split(',').map(|s| s.trim().parse()).collect();
+    match numbers.as_deref() {
+        Ok(&[x, y, width, height]) if width > 0 && height > 0 => Ok(Rect { x, y, width, height }),
+        _ => Err("write x,y,width,height in pixels, as in 236,228,128,96".into()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_read_as_people_write_them() {
+        assert_eq!(count("200000"), Ok(200_000));
+        assert_eq!(count("2e5"), Ok(200_000));
+        assert_eq!(count("-3"), Ok(-3));
+        assert!(count("nan").is_err() && count("1.5").is_err() && count("").is_err());
+        assert_eq!(size("640x480"), Ok([640, 480]));
+        assert!(size("640").is_err() && size("-1x5").is_err());
+        assert!(rect("1,2,3,4").is_ok() && rect("1,2,0,4").is_err() && rect("1,2,3").is_err());
+    }
+}

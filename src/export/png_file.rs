@@ -1,0 +1,30 @@
+//! PNG with provenance in its text chunks.
+
+use crate::export::Provenance;
+use crate::export::whole_file::{self, WriteError};
+use std::path::Path;
+
+/// Writes an eight-bit RGB image of `size` pixels, row 0 on top.
+///
+/// # Errors
+/// If the file cannot be written.
+pub fn write(path: &Path, size: [u32; 2], rgb: &[u8], provenance: &Provenance) -> Result<(), WriteError> {
+    let bytes = encode(size, rgb, provenance).map_err(|e| WriteError {
+        path: path.to_owned(),
+        why: e.to_string(),
+    })?;
+    whole_file::write(path, &bytes)
+}
+
+fn encode(size: [u32; 2], rgb: &[u8], provenance: &Provenance) -> Result<Vec<u8>, png::EncodingError> {
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, size[0], size[1]);
+    encoder.set_color(png::ColorType::Rgb);
+    encoder.set_depth(png::BitDepth::Eight);
+    encoder.set_compression(png::Compression::High);
+    for (key, value) in provenance.pairs() {
+        encoder.add_itxt_chunk(key.into(), value)?;
+    }
+    encoder.write_header()?.write_image_data(rgb)?;
+    Ok(bytes)
+}
