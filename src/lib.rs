@@ -5,15 +5,13 @@
 //! `Scene → Plan → PhotonPass → PhotonMaps → ViewPass (tiles) → Film per estimator → measure / export`.
 //! A module uses those above it in this list, never those below.
 
+pub mod estimate;
 pub mod math;
+pub mod photons;
+pub mod render;
 pub mod scene;
 pub mod trace;
-pub mod photons;
-pub mod estimate;
-pub mod render;
 
-
-
-pub mod measure;
-pub mod export;
 pub mod cli;
+pub mod export;
+pub mod measure;

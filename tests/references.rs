@@ -12,11 +12,7 @@ use cusp::scene::scene_file::RenderFile;
 fn agrees(name: &str, passes: u32, photons: i64, regions: &[([u32; 4], [f32; 3])], limit: f64) {
     let reference = Reference::built_in(name).expect("decodes").expect("stored");
     let scene = open(name).expect("built in");
-    let flags = RenderFile {
-        photons: Some(photons),
-        shadow_rays: Some(1),
-        ..Default::default()
-    };
+    let flags = RenderFile { photons: Some(photons), shadow_rays: Some(1), ..Default::default() };
     let settings = RenderSettings::new(&scene, &flags, Some([256, 256]), 1).expect("valid");
     let mut renderer = Renderer::new(scene, settings, vec![estimator("integrated").expect("registered")]);
     let start = std::time::Instant::now();
@@ -29,7 +25,10 @@ fn agrees(name: &str, passes: u32, photons: i64, regions: &[([u32; 4], [f32; 3])
     let error = compare(&small, &small_reference, &mask).expect("same size");
     println!(
         "{name}: {passes} passes in {:.1} s, {:?}, relative RMSE {:.3} %, mean ratio {:.4}",
-        start.elapsed().as_secs_f64(), renderer.seconds(), 100.0 * error.relative_rmse, error.mean_ratio
+        start.elapsed().as_secs_f64(),
+        renderer.seconds(),
+        100.0 * error.relative_rmse,
+        error.mean_ratio
     );
     for (rect, expected) in regions {
         let mean = region_mean(&image, *rect);
@@ -62,11 +61,8 @@ fn ring() {
 
 #[test]
 fn ring_soft() {
-    let regions = [
-        ([20, 20, 60, 60], grey(0.19118)),
-        ([140, 100, 200, 150], grey(0.16876)),
-        ([90, 75, 190, 95], grey(0.07099)),
-    ];
+    let regions =
+        [([20, 20, 60, 60], grey(0.19118)), ([140, 100, 200, 150], grey(0.16876)), ([90, 75, 190, 95], grey(0.07099))];
     agrees("ring_soft", 40, 400_000, &regions, 0.06);
 }
 

@@ -1,19 +1,21 @@
 //! `cusp compare`: estimators side by side on the same photons.
 
+use crate::cli::compare_table::text;
 use crate::cli::failure::Failure;
 use crate::cli::flags::{CommonFlags, rect};
 use crate::cli::progress::{bar, interrupted, listen_for_interrupts};
-use crate::cli::table::{Table, percent};
+use crate::cli::table::percent;
 use crate::cli::{print, to_json};
-use crate::estimate::Estimator;
 use crate::estimate::registry::{self, ESTIMATORS};
 use crate::estimate::regular::Regular;
+use crate::estimate::{Estimator, Lookup};
 use crate::export::report::{CompareReport, EstimatorReport, EstimatorSeconds, PlanCost, RenderReport};
 use crate::export::sheet::{self, Column, PALETTE, Sheet};
 use crate::export::tone::{auto_exposure, to_srgb};
 use crate::export::{Provenance, exr_file, png_file, whole_file};
+use crate::measure::Reference;
 use crate::measure::metrics::{Mask, compare};
-use crate::measure::{ErrorMetrics, Reference};
+use crate::measure::window::{busiest_window, contours, disagreement};
 use crate::photons::map::MapParts;
 use crate::render::film::{Image, Rect};
 use crate::render::photon_pass::PhotonMaps;
@@ -29,7 +31,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 /// View rays along a pixel's side in the truth that estimators are compared with.
-const TRUTH_RAYS: u32 = 16;
+pub const TRUTH_RAYS: u32 = 16;
 /// Largest crop that is chosen by default.
 const CROP: [u32; 2] = [128, 96];
 
@@ -75,16 +77,7 @@ enum Truth {
 impl CompareArgs {
     /// The comparison of a scene at its defaults.
     pub fn of(scene: String, flags: CommonFlags) -> Self {
-        Self {
-            scene,
-            estimators: None,
-            crop: None,
-            enlarge: 3,
-            truth: Truth::Crop,
-            reference: None,
-            mask: None,
-            flags,
-        }
+        Self { scene, estimators: None, crop: None, enlarge: 3, truth: Truth::Crop, reference: None, mask: None, flags }
     }
 }
 
@@ -132,29 +125,20 @@ impl<'a> Comparison<'a> {
             r.error_of(&Image::black(settings.size)).map_err(|e| Failure::Call(format!("--reference: {e}")))?;
         }
         let load = start.elapsed().as_secs_f64();
-        Ok(Self {
-            args,
-            renderer: Renderer::new(scene, settings, estimators),
-            reference,
-            start,
-            load,
-        })
+        Ok(Self { args, renderer: Renderer::new(scene, settings, estimators), reference, start, load })
     }
 
     fn run(mut self) -> Result<(), Failure> {
         let hidden = self.args.flags.quiet || self.args.flags.json;
         let steps = tiles(Rect::whole(self.renderer.settings().size)).len() as u64;
         let progress = bar(steps, "estimators", hidden);
-        let step = self.renderer.step(&Watch {
-            cancelled: &interrupted,
-            tile_done: &|| progress.inc(1),
-        });
+        let step = self.renderer.step(&Watch { cancelled: &interrupted, tile_done: &|| progress.inc(1) });
         progress.finish_and_clear();
         if step == Step::Cancelled {
             return Err(Failure::Interrupted("nothing was written".into()));
         }
         let images: Vec<Image> = self.renderer.films().iter().map(|f| f.image()).collect();
-        let crop = self.args.crop.unwrap_or_else(|| busiest(self.base_for_crop(&images), CROP));
+        let crop = self.args.crop.unwrap_or_else(|| self.default_crop(&images));
         let truth = self.truth(crop, hidden);
         let plan_cost = if interrupted() { None } else { self.plan_cost() };
         let names = file_names(self.renderer.estimators());
@@ -177,8 +161,22 @@ impl<'a> Comparison<'a> {
         Ok(())
     }
 
-    /// The image in which the default crop is looked for: the last consistent estimator's, which is the smoothest.
-    fn base_for_crop<'i>(&self, images: &'i [Image]) -> &'i Image {
+    /// Where the estimators that use footprints disagree most; where the image changes most if there is but one.
+    fn default_crop(&self, images: &[Image]) -> Rect {
+        let by_footprint: Vec<&Image> = images
+            .iter()
+            .zip(self.renderer.estimators())
+            .filter(|(_, e)| e.lookup() != Lookup::Disc)
+            .map(|(i, _)| i)
+            .collect();
+        match by_footprint.as_slice() {
+            [] | [_] => busiest_window(&contours(self.smoothest(images)), CROP),
+            several => busiest_window(&disagreement(several), CROP),
+        }
+    }
+
+    /// The last consistent estimator's image.
+    fn smoothest<'i>(&self, images: &'i [Image]) -> &'i Image {
         let at = self.renderer.estimators().iter().rposition(|e| e.is_consistent());
         &images[at.unwrap_or(0)]
     }
@@ -229,11 +227,7 @@ impl<'a> Comparison<'a> {
         let full = Plan::new(r.scene(), r.intersector(), &settings, &slots);
         let timed = |plan: &Plan| {
             let start = Instant::now();
-            let photons = if plan.needs_photons() {
-                r.emitter(plan).run(0, &interrupted)
-            } else {
-                Default::default()
-            };
+            let photons = if plan.needs_photons() { r.emitter(plan).run(0, &interrupted) } else { Default::default() };
             let maps = PhotonMaps::new(r.scene(), plan, &photons.stored, settings.footprint_scale);
             let stored: usize = maps.all().map(|m| m.photons().len()).sum();
             (start.elapsed().as_secs_f64(), stored as u64)
@@ -253,23 +247,16 @@ impl<'a> Comparison<'a> {
     ) -> CompareReport {
         let r = &self.renderer;
         let [w, h] = r.settings().size;
-        let regular = r
-            .estimators()
-            .iter()
-            .position(|e| e.id() == "regular")
-            .map(|i| r.estimator_seconds()[i].total());
+        let regular = r.estimators().iter().position(|e| e.id() == "regular").map(|i| r.estimator_seconds()[i].total());
         let estimators = r.estimators().iter().enumerate().map(|(i, e)| {
             let parts = r.estimator_seconds()[i];
-            let error = |image: Option<ErrorMetrics>| image;
             EstimatorReport {
                 id: e.id().into(),
                 settings: e.settings(),
                 seconds: EstimatorSeconds { parts, view_pass: parts.total() },
                 ratio_to_regular: regular.filter(|&s| s > 0.0).map(|s| parts.total() / s),
                 photons_per_pixel: r.gathered()[i] as f64 / (f64::from(w) * f64::from(h)),
-                error: error(truth.and_then(|(region, t)| {
-                    compare(&images[i].crop(*region), t, &Mask::all(t.size)).ok()
-                })),
+                error: truth.and_then(|(region, t)| compare(&images[i].crop(*region), t, &Mask::all(t.size)).ok()),
                 reference_error: self.reference.as_ref().and_then(|x| x.error_of(&images[i]).ok()),
                 files: [".exr", ".png", "_crop.exr", "_crop.png"].map(|s| format!("{}{s}", names[i])).into(),
             }
@@ -296,10 +283,11 @@ impl<'a> Comparison<'a> {
         names: &[String],
     ) -> Result<(), Failure> {
         let provenance = Provenance::new(self.renderer.scene(), self.renderer.settings().seed);
-        let exposure = auto_exposure(self.base_for_crop(images));
+        let exposure = auto_exposure(self.smoothest(images));
         let both = |name: &str, image: &Image, enlarge: u32| -> Result<(), Failure> {
             exr_file::write(&folder.join(format!("{name}.exr")), image, &provenance)?;
-            let mut canvas = crate::export::text::Canvas::new([image.size[0] * enlarge, image.size[1] * enlarge], [0; 3]);
+            let mut canvas =
+                crate::export::text::Canvas::new([image.size[0] * enlarge, image.size[1] * enlarge], [0; 3]);
             canvas.paste(0, 0, image.size, &to_srgb(image, exposure), enlarge);
             png_file::write(&folder.join(format!("{name}.png")), canvas.size, &canvas.rgb, &provenance)?;
             Ok(())
@@ -350,12 +338,17 @@ impl<'a> Comparison<'a> {
             title: format!("{}: radiance estimators on the same photons", r.provenance.scene),
             subtitle: format!(
                 "{}x{} pixels, {} photons emitted, {} caustic and {} global stored, {}, footprint scale {}, seed {}",
-                r.size[0], r.size[1], r.photons_emitted, r.photons_stored.caustic, r.photons_stored.global,
+                r.size[0],
+                r.size[1],
+                r.photons_emitted,
+                r.photons_stored.caustic,
+                r.photons_stored.global,
                 match r.gather {
                     Gather::Knn => format!("the {} nearest gathered", r.settings.k),
                     Gather::Overlap => "gathered by overlap".into(),
                 },
-                r.settings.footprint_scale, r.provenance.seed
+                r.settings.footprint_scale,
+                r.provenance.seed
             ),
             columns: columns.collect(),
             crop,
@@ -369,43 +362,7 @@ impl<'a> Comparison<'a> {
 fn signed_error(image: &Image, truth: &Image) -> Image {
     let mean = truth.pixels.iter().map(|p| crate::math::rgb::mean(*p)).sum::<f32>() / truth.pixels.len().max(1) as f32;
     let scale = if mean > 0.0 { 1.0 / mean } else { 0.0 };
-    Image {
-        size: image.size,
-        pixels: image.pixels.iter().zip(&truth.pixels).map(|(x, t)| (*x - *t) * scale).collect(),
-    }
-}
-
-/// The window of that size, or of the image's, over which the logarithm of the radiance changes most.
-fn busiest(image: &Image, size: [u32; 2]) -> Rect {
-    let [w, h] = image.size;
-    let (width, height) = (size[0].min(w), size[1].min(h));
-    let mean = image.pixels.iter().map(|p| crate::math::rgb::luminance(*p)).sum::<f32>() / image.pixels.len() as f32;
-    // Compressed, so that one bright spot does not outweigh a long contour.
-    let value = |x: u32, y: u32| {
-        let l = crate::math::rgb::luminance(image.at(x, y));
-        f64::from(l / (l + mean.max(f32::MIN_POSITIVE)))
-    };
-    // Sums over rectangles from the corner.
-    let mut table = vec![0.0f64; ((w + 1) * (h + 1)) as usize];
-    let at = |x: u32, y: u32| (y * (w + 1) + x) as usize;
-    for y in 0..h {
-        for x in 0..w {
-            let v = value(x, y);
-            let dx = value((x + 1).min(w - 1), y) - v;
-            let dy = value(x, (y + 1).min(h - 1)) - v;
-            table[at(x + 1, y + 1)] = (dx * dx + dy * dy).sqrt() + table[at(x, y + 1)] + table[at(x + 1, y)] - table[at(x, y)];
-        }
-    }
-    let mut best = (f64::NEG_INFINITY, 0, 0);
-    for y in (0..=h - height).step_by(4) {
-        for x in (0..=w - width).step_by(4) {
-            let sum = table[at(x + width, y + height)] - table[at(x, y + height)] - table[at(x + width, y)] + table[at(x, y)];
-            if sum > best.0 {
-                best = (sum, x, y);
-            }
-        }
-    }
-    Rect { x: best.1, y: best.2, width, height }
+    Image { size: image.size, pixels: image.pixels.iter().zip(&truth.pixels).map(|(x, t)| (*x - *t) * scale).collect() }
 }
 
 /// File names: ids, with settings where two would be the same.
@@ -429,94 +386,25 @@ fn file_names(estimators: &[Box<dyn Estimator>]) -> Vec<String> {
 
 /// Letters, digits and a few signs; anything else becomes a hyphen.
 fn file_stem(name: &str) -> String {
-    name.chars()
-        .map(|c| if c.is_ascii_alphanumeric() || "._-".contains(c) { c } else { '-' })
-        .collect()
-}
-
-/// The table for people.
-fn text(report: &CompareReport, folder: &Path) -> String {
-    let r = &report.render;
-    let stored = &r.photons_stored;
-    let seconds = |s: f64| format!("{s:.3}");
-    let mut table = Table::new([
-        "estimator", "view pass s", "view rays s", "gather s", "estimate s", "x regular", "photons/pixel", "error", "to reference",
-    ]);
-    for e in &report.estimators {
-        let name = if e.settings.is_empty() { e.id.clone() } else { format!("{}:{}", e.id, e.settings) };
-        table.row([
-            name,
-            seconds(e.seconds.view_pass),
-            seconds(e.seconds.parts.view_trace),
-            seconds(e.seconds.parts.gather),
-            seconds(e.seconds.parts.estimate),
-            e.ratio_to_regular.map_or("-".into(), |x| format!("{x:.2}")),
-            format!("{:.1}", e.photons_per_pixel),
-            percent(e.error.map(|e| e.relative_rmse)),
-            percent(e.reference_error.map(|e| e.relative_rmse)),
-        ]);
-    }
-    let c = report.crop;
-    let mut out = format!(
-        "{}: {}x{}, {} photons emitted, stored {} direct, {} caustic, {} global; photons {:.3} s, maps {:.3} s\n\n{}\n",
-        r.provenance.scene, r.size[0], r.size[1], r.photons_emitted, stored.direct, stored.caustic, stored.global,
-        r.seconds.photon_trace, r.seconds.map_build, table.text()
-    );
-    let place = match report.truth {
-        Some(t) if t == c => format!("the crop {},{},{},{}", c.x, c.y, c.width, c.height),
-        Some(_) => "the whole image".into(),
-        None => String::new(),
-    };
-    if !place.is_empty() {
-        out.push_str(&format!(
-            "error: relative RMSE over {place} against regular with {TRUTH_RAYS}x{TRUTH_RAYS} view rays on the same photons, all that overlap\n"
-        ));
-    }
-    if let Some(reference) = &report.reference {
-        out.push_str(&format!("to reference: relative RMSE of one pass against the {reference}\n"));
-    }
-    out.push_str("\nplan\n");
-    let width = r.plan.items.iter().map(|i| i.part.len()).max().unwrap_or(0);
-    for item in &r.plan.items {
-        out.push_str(&format!("  {:<width$}  {:<8}  {}\n", item.part, if item.on { "on" } else { "left out" }, item.why));
-    }
-    if let Some(cost) = &report.plan_cost {
-        out.push_str(&format!(
-            "  photons and maps: {:.3} s and {} stored as planned; {:.3} s and {} stored with every part on ({:.2} x)\n",
-            cost.needed_seconds, cost.needed_stored, cost.full_seconds, cost.full_stored,
-            if cost.needed_seconds > 0.0 { cost.full_seconds / cost.needed_seconds } else { 1.0 }
-        ));
-    }
-    out.push_str(&format!("\n{:.1} s in all; files in {}\n", r.seconds.total, folder.display()));
-    out
+    name.chars().map(|c| if c.is_ascii_alphanumeric() || "._-".contains(c) { c } else { '-' }).collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use glam::Vec3;
-
-    #[test]
-    fn the_busiest_window_holds_the_contour() {
-        let mut image = Image::black([256, 200]);
-        for y in 0..200 {
-            for x in 0..256 {
-                if (x as i32 - 180).pow(2) + (y as i32 - 120).pow(2) < 900 {
-                    image.pixels[y * 256 + x] = Vec3::ONE;
-                }
-            }
-        }
-        let r = busiest(&image, [64, 64]);
-        assert!(r.x <= 150 && r.x + 64 >= 210 && r.y <= 90 && r.y + 64 >= 150, "{r:?}");
-        assert_eq!(busiest(&Image::black([10, 5]), [64, 64]), Rect { x: 0, y: 0, width: 10, height: 5 });
-    }
 
     #[test]
     fn file_names_are_told_apart() {
-        let list = registry::estimators("regular,multi_sampled:n=2,multi_sampled:n=4,multi_sampled:n=4").expect("parses");
+        let list =
+            registry::estimators("regular,multi_sampled:n=2,multi_sampled:n=4,multi_sampled:n=4").expect("parses");
         assert_eq!(
             file_names(&list),
-            ["regular", "multi_sampled-n-2-grid-closed", "multi_sampled-n-4-grid-closed", "multi_sampled-n-4-grid-closed-2"]
+            [
+                "regular",
+                "multi_sampled-n-2-grid-closed",
+                "multi_sampled-n-4-grid-closed",
+                "multi_sampled-n-4-grid-closed-2"
+            ]
         );
     }
 }

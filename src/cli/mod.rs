@@ -1,6 +1,7 @@
 //! The command line: one file for each command.
 
 pub mod compare;
+mod compare_table;
 pub mod failure;
 pub mod flags;
 pub mod lists;
@@ -95,9 +96,7 @@ fn one_line(error: &clap::Error) -> String {
 fn print(text: &str) -> Result<(), Failure> {
     use std::io::Write;
     match std::io::stdout().write_all(text.as_bytes()) {
-        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => {
-            Err(Failure::Work(format!("standard output: {e}")))
-        }
+        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => Err(Failure::Work(format!("standard output: {e}"))),
         _ => Ok(()),
     }
 }
@@ -107,7 +106,5 @@ fn print(text: &str) -> Result<(), Failure> {
 /// # Errors
 /// A value that JSON cannot hold, which would be a defect.
 fn to_json<T: serde::Serialize>(value: &T) -> Result<String, Failure> {
-    serde_json::to_string_pretty(value)
-        .map(|s| s + "\n")
-        .map_err(|e| Failure::Work(format!("JSON: {e}")))
+    serde_json::to_string_pretty(value).map(|s| s + "\n").map_err(|e| Failure::Work(format!("JSON: {e}")))
 }

@@ -89,11 +89,7 @@ pub fn run(args: &RenderArgs) -> Result<(), Failure> {
             }
             print(&summary(&report, &path.display().to_string()))?;
         }
-        if finished {
-            Ok(())
-        } else {
-            Err(Failure::Interrupted(format!("{passes} passes were written")))
-        }
+        if finished { Ok(()) } else { Err(Failure::Interrupted(format!("{passes} passes were written"))) }
     })
 }
 
@@ -107,10 +103,7 @@ fn passes(args: &RenderArgs, renderer: &mut Renderer, start: &Instant) -> bool {
     let per_pass = tiles(Rect::whole(renderer.settings().size)).len() as u64;
     let shown = if wanted == u32::MAX { 1 } else { wanted };
     let bar = bar(per_pass * u64::from(shown), "render", args.flags.quiet || args.flags.json);
-    let watch = Watch {
-        cancelled: &interrupted,
-        tile_done: &|| bar.inc(1),
-    };
+    let watch = Watch { cancelled: &interrupted, tile_done: &|| bar.inc(1) };
     let mut finished = true;
     while renderer.passes() < wanted {
         if args.seconds.is_some_and(|s| renderer.passes() > 0 && start.elapsed().as_secs_f64() >= s) {
@@ -136,8 +129,23 @@ fn summary(r: &RenderReport, path: &str) -> String {
         "{path}: {} by {}, {}x{}, {} passes\n\
          photons: {} emitted; stored {} direct, {} caustic, {} global\n\
          seconds: load {:.3}, bvh {:.3}, plan {:.3}, photons {:.3}, maps {:.3}, view rays {:.3}, gather {:.3}, estimate {:.3}; total {:.3}\n",
-        r.provenance.scene, r.estimator, r.size[0], r.size[1], r.passes, r.photons_emitted, stored.direct,
-        stored.caustic, stored.global, s.load, s.bvh, s.plan, s.photon_trace, s.map_build, s.view_trace, s.gather,
-        s.estimate, s.total
+        r.provenance.scene,
+        r.estimator,
+        r.size[0],
+        r.size[1],
+        r.passes,
+        r.photons_emitted,
+        stored.direct,
+        stored.caustic,
+        stored.global,
+        s.load,
+        s.bvh,
+        s.plan,
+        s.photon_trace,
+        s.map_build,
+        s.view_trace,
+        s.gather,
+        s.estimate,
+        s.total
     )
 }

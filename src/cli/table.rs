@@ -11,9 +11,7 @@ pub struct Table {
 impl Table {
     /// A table with that heading.
     pub fn new<S: Into<String>>(heading: impl IntoIterator<Item = S>) -> Self {
-        Self {
-            rows: vec![heading.into_iter().map(Into::into).collect()],
-        }
+        Self { rows: vec![heading.into_iter().map(Into::into).collect()] }
     }
 
     /// Adds a row.
@@ -24,14 +22,7 @@ impl Table {
     /// The table as lines of text.
     pub fn text(&self) -> String {
         let columns = self.rows.iter().map(Vec::len).max().unwrap_or(0);
-        let width = |c: usize| {
-            self.rows
-                .iter()
-                .filter_map(|r| r.get(c))
-                .map(|s| s.chars().count())
-                .max()
-                .unwrap_or(0)
-        };
+        let width = |c: usize| self.rows.iter().filter_map(|r| r.get(c)).map(|s| s.chars().count()).max().unwrap_or(0);
         let widths: Vec<usize> = (0..columns).map(width).collect();
         let mut out = String::new();
         for row in &self.rows {
@@ -39,11 +30,7 @@ impl Table {
             for (c, cell) in row.iter().enumerate() {
                 let w = widths[c];
                 // Writing to a string cannot fail.
-                let _ = if c == 0 {
-                    write!(line, "{cell:<w$}")
-                } else {
-                    write!(line, "  {cell:>w$}")
-                };
+                let _ = if c == 0 { write!(line, "{cell:<w$}") } else { write!(line, "  {cell:>w$}") };
             }
             out.push_str(line.trim_end());
             out.push('\n');

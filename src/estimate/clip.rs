@@ -34,19 +34,9 @@ pub struct ClippedPolygon {
 impl ClippedPolygon {
     /// The whole view parallelogram with centre `c` and half-edges `a`, `b` in the photon's footprint.
     pub fn whole(c: DVec2, a: DVec2, b: DVec2) -> Self {
-        let mut polygon = Self {
-            vertices: [Vertex::default(); MAX_VERTICES],
-            len: 4,
-        };
-        for (v, (s, t)) in polygon
-            .vertices
-            .iter_mut()
-            .zip([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
-        {
-            *v = Vertex {
-                parameter: DVec2::new(s, t),
-                footprint: c + a * s + b * t,
-            };
+        let mut polygon = Self { vertices: [Vertex::default(); MAX_VERTICES], len: 4 };
+        for (v, (s, t)) in polygon.vertices.iter_mut().zip([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]) {
+            *v = Vertex { parameter: DVec2::new(s, t), footprint: c + a * s + b * t };
         }
         polygon
     }
@@ -115,12 +105,7 @@ impl ClippedPolygon {
 
 /// Half-planes of the square `[-1, 1]²`: the photon's parallelogram (Pedersen 2011, eq. 61).
 pub fn square() -> Vec<HalfPlane> {
-    [DVec2::X, DVec2::Y, DVec2::NEG_X, DVec2::NEG_Y]
-        .map(|normal| HalfPlane {
-            normal,
-            distance: 1.0,
-        })
-        .into()
+    [DVec2::X, DVec2::Y, DVec2::NEG_X, DVec2::NEG_Y].map(|normal| HalfPlane { normal, distance: 1.0 }).into()
 }
 
 /// Half-planes of the polygon of `n` corners inscribed in the unit circle (Pedersen 2011, eq. 62).
@@ -129,10 +114,7 @@ pub fn inscribed(n: usize) -> Vec<HalfPlane> {
     (0..n)
         .map(|i| {
             let (s, c) = libm::sincos((i as f64 + 0.5) * step);
-            HalfPlane {
-                normal: DVec2::new(c, s),
-                distance: libm::cos(step / 2.0),
-            }
+            HalfPlane { normal: DVec2::new(c, s), distance: libm::cos(step / 2.0) }
         })
         .collect()
 }

@@ -46,11 +46,7 @@ impl Coplanar {
             Shape::Parallelogram => clip::square(),
             Shape::Ellipse(n) => clip::inscribed((n as usize).clamp(3, MAX_CORNERS)),
         };
-        Self {
-            shape,
-            weight,
-            planes,
-        }
+        Self { shape, weight, planes }
     }
 
     /// `coplanar`, with `shape` and `weight`.
@@ -59,11 +55,8 @@ impl Coplanar {
     /// An unknown setting or value.
     pub fn parse(spec: &Spec) -> Result<Box<dyn Estimator>, SpecError> {
         spec.only(&["shape", "weight"])?;
-        let weight = spec.choice(
-            "weight",
-            Weight::Centroid,
-            &[("centroid", Weight::Centroid), ("mean", Weight::Mean)],
-        )?;
+        let weight =
+            spec.choice("weight", Weight::Centroid, &[("centroid", Weight::Centroid), ("mean", Weight::Mean)])?;
         let shape = match spec.get("shape") {
             None | Some("parallelogram") => Shape::Parallelogram,
             Some("ellipse") => Shape::Ellipse(20),

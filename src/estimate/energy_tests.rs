@@ -22,10 +22,7 @@ fn photon(footprint: [Vec3; 2]) -> MapPhoton {
 }
 
 fn view(center: Vec3, axes: [Vec3; 2]) -> View {
-    View {
-        query: Query { center, normal: Vec3::Y, axes },
-        direction: Vec3::new(0.3, -0.9, 0.2).normalize(),
-    }
+    View { query: Query { center, normal: Vec3::Y, axes }, direction: Vec3::new(0.3, -0.9, 0.2).normalize() }
 }
 
 /// Integral of the estimate of one photon of unit power over the plane, on a grid around it.
@@ -50,16 +47,14 @@ fn footprints(count: u64) -> impl Iterator<Item = ([Vec3; 2], [Vec3; 2])> {
         let x = sequence.four(i, set).map(|x| 2.0 * x - 1.0);
         [Vec3::new(x[0], 0.0, x[1]), Vec3::new(x[2], 0.0, x[3])]
     };
-    (0..count)
-        .map(move |i| (pair(i, 0), pair(i, 1)))
-        .filter(|(p, v)| {
-            // Slivers need a finer grid than this test affords; they are tested in `polygon`.
-            let round = |f: &[Vec3; 2]| {
-                let size = f[0].length().max(f[1].length());
-                f[0].cross(f[1]).length() > 0.2 * size * size && size > 0.3
-            };
-            round(p) && round(v)
-        })
+    (0..count).map(move |i| (pair(i, 0), pair(i, 1))).filter(|(p, v)| {
+        // Slivers need a finer grid than this test affords; they are tested in `polygon`.
+        let round = |f: &[Vec3; 2]| {
+            let size = f[0].length().max(f[1].length());
+            f[0].cross(f[1]).length() > 0.2 * size * size && size > 0.3
+        };
+        round(p) && round(v)
+    })
 }
 
 #[test]
@@ -138,7 +133,10 @@ fn small_view_footprints_give_regular() {
             let e = estimator(name).expect(name);
             for size in [1e-3f32, 0.0] {
                 let w = e.weight(&p, &view(x, v.map(|a| a * size)), 0.0);
-                assert!((w - exact).abs() <= (0.02 * f64::from(size).sqrt() + 2e-5) * f64::from(p.inverse_area), "{name} {size}");
+                assert!(
+                    (w - exact).abs() <= (0.02 * f64::from(size).sqrt() + 2e-5) * f64::from(p.inverse_area),
+                    "{name} {size}"
+                );
             }
         }
     }

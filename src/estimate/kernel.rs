@@ -40,10 +40,7 @@ impl Kernel {
 
     /// The kernel's name.
     pub fn name(self) -> &'static str {
-        Self::ALL
-            .iter()
-            .find(|(_, k)| *k == self)
-            .map_or("", |(n, _)| n)
+        Self::ALL.iter().find(|(_, k)| *k == self).map_or("", |(n, _)| n)
     }
 
     /// Value at the squared relative distance `u`; 0 for `u > 1`.

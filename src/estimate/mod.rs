@@ -78,11 +78,7 @@ pub trait Estimator: Send + Sync {
     /// Id and settings, as the command line takes them.
     fn name(&self) -> String {
         let settings = self.settings();
-        if settings.is_empty() {
-            self.id().to_owned()
-        } else {
-            format!("{}:{settings}", self.id())
-        }
+        if settings.is_empty() { self.id().to_owned() } else { format!("{}:{settings}", self.id()) }
     }
 }
 

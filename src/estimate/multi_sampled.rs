@@ -46,12 +46,7 @@ impl MultiSampled {
                 (offset, weight)
             })
             .collect();
-        Self {
-            n,
-            grid,
-            offsets,
-            lanes,
-        }
+        Self { n, grid, offsets, lanes }
     }
 
     /// `multi_sampled`, with `n` and `grid`.

@@ -20,19 +20,13 @@ struct AngleSum {
 
 impl AngleSum {
     fn new() -> Self {
-        Self {
-            z: DVec2::X,
-            turns: 0,
-        }
+        Self { z: DVec2::X, turns: 0 }
     }
 
     /// Adds the angle from `p` to `q`, in (-π, π). Both lie outside the disc, so lengths never vanish.
     fn add(&mut self, p: DVec2, q: DVec2) {
         let w = DVec2::new(p.dot(q), p.perp_dot(q));
-        let mut z = DVec2::new(
-            self.z.x * w.x - self.z.y * w.y,
-            self.z.x * w.y + self.z.y * w.x,
-        );
+        let mut z = DVec2::new(self.z.x * w.x - self.z.y * w.y, self.z.x * w.y + self.z.y * w.x);
         let size = z.x.abs().max(z.y.abs());
         if size > 1e100 {
             z /= size;
@@ -55,11 +49,8 @@ impl AngleSum {
 }
 
 /// `∫₋₁¹` nodes and weights of the three-point Gauss rule.
-const GAUSS: [(f64, f64); 3] = [
-    (-0.774_596_669_241_483_4, 5.0 / 9.0),
-    (0.0, 8.0 / 9.0),
-    (0.774_596_669_241_483_4, 5.0 / 9.0),
-];
+const GAUSS: [(f64, f64); 3] =
+    [(-0.774_596_669_241_483_4, 5.0 / 9.0), (0.0, 8.0 / 9.0), (0.774_596_669_241_483_4, 5.0 / 9.0)];
 
 /// Integral of `(1 - u)²` over the part of a convex or simple polygon inside the unit disc.
 ///
@@ -159,12 +150,7 @@ pub fn mean_over_parallelogram(c: Vec3, a: Vec3, b: Vec3) -> f64 {
     let center = DVec2::new(x, y) * scale;
     let u = DVec2::new(length * scale, 0.0);
     let v = DVec2::new(along, width) * scale;
-    let integral = integral_over_polygon(&[
-        center - u - v,
-        center + u - v,
-        center + u + v,
-        center - u + v,
-    ]);
+    let integral = integral_over_polygon(&[center - u - v, center + u - v, center + u + v, center - u + v]);
     (rho2 * rho2 * integral / (4.0 * u.x * v.y)).min(1.0)
 }
 

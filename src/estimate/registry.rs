@@ -104,21 +104,14 @@ pub fn estimators(text: &str) -> Result<Vec<Box<dyn Estimator>>, SpecError> {
         }
     }
     if specs.is_empty() {
-        return Err(SpecError {
-            text: text.to_owned(),
-            what: format!("name at least one; there are {}", names()),
-        });
+        return Err(SpecError { text: text.to_owned(), what: format!("name at least one; there are {}", names()) });
     }
     specs.iter().map(|s| estimator(s.trim())).collect()
 }
 
 /// Names of all estimators, separated by commas.
 pub fn names() -> String {
-    ESTIMATORS
-        .iter()
-        .map(|e| e.id)
-        .collect::<Vec<_>>()
-        .join(", ")
+    ESTIMATORS.iter().map(|e| e.id).collect::<Vec<_>>().join(", ")
 }
 
 /// Whether an estimator needs photon footprints.

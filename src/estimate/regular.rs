@@ -64,11 +64,7 @@ impl Estimator for Regular {
     }
 
     fn settings(&self) -> String {
-        if self.rays == 1 {
-            String::new()
-        } else {
-            format!("n={}", self.rays)
-        }
+        if self.rays == 1 { String::new() } else { format!("n={}", self.rays) }
     }
 
     fn lookup(&self) -> Lookup {

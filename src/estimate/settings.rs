@@ -27,11 +27,7 @@ impl<'a> Spec<'a> {
     /// A setting that is no `key=value`, or that comes twice.
     pub fn parse(text: &'a str) -> Result<Self, SpecError> {
         let (id, rest) = text.split_once(':').unwrap_or((text, ""));
-        let mut spec = Self {
-            text,
-            id: id.trim(),
-            pairs: Vec::new(),
-        };
+        let mut spec = Self { text, id: id.trim(), pairs: Vec::new() };
         for part in rest.split(',').filter(|p| !p.trim().is_empty()) {
             let Some((key, value)) = part.split_once('=') else {
                 return Err(spec.error(format!("`{part}` is no setting; write key=value")));
@@ -47,10 +43,7 @@ impl<'a> Spec<'a> {
 
     /// An error about this text.
     pub fn error(&self, what: impl Into<String>) -> SpecError {
-        SpecError {
-            text: self.text.to_owned(),
-            what: what.into(),
-        }
+        SpecError { text: self.text.to_owned(), what: what.into() }
     }
 
     /// Checks that no other settings are there than `known`.

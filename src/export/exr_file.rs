@@ -4,8 +4,7 @@ use crate::export::Provenance;
 use crate::export::whole_file::{self, WriteError};
 use crate::render::film::Image;
 use exr::prelude::{
-    AttributeValue, Encoding, Image as ExrImage, Layer, LayerAttributes, SpecificChannels, Text, Vec2,
-    WritableImage,
+    AttributeValue, Encoding, Image as ExrImage, Layer, LayerAttributes, SpecificChannels, Text, Vec2, WritableImage,
 };
 use std::io::Cursor;
 use std::path::Path;
@@ -15,10 +14,7 @@ use std::path::Path;
 /// # Errors
 /// If the file cannot be written.
 pub fn write(path: &Path, image: &Image, provenance: &Provenance) -> Result<(), WriteError> {
-    let wrong = |why: String| WriteError {
-        path: path.to_owned(),
-        why,
-    };
+    let wrong = |why: String| WriteError { path: path.to_owned(), why };
     let [w, h] = image.size;
     let channels = SpecificChannels::rgb(|Vec2(x, y)| {
         let p = image.at(x as u32, y as u32);
@@ -26,9 +22,7 @@ pub fn write(path: &Path, image: &Image, provenance: &Provenance) -> Result<(), 
     });
     let mut attributes = LayerAttributes::default();
     for (key, value) in provenance.pairs() {
-        attributes
-            .other
-            .insert(Text::from(key), AttributeValue::Text(ascii(&value)));
+        attributes.other.insert(Text::from(key), AttributeValue::Text(ascii(&value)));
     }
     let layer = Layer::new((w as usize, h as usize), attributes, Encoding::SMALL_LOSSLESS, channels);
     let mut bytes = Vec::new();
@@ -42,10 +36,7 @@ pub fn write(path: &Path, image: &Image, provenance: &Provenance) -> Result<(), 
 
 /// EXR text is single bytes; anything else becomes a question mark.
 fn ascii(text: &str) -> Text {
-    let plain: String = text
-        .chars()
-        .map(|c| if c.is_ascii() { c } else { '?' })
-        .collect();
+    let plain: String = text.chars().map(|c| if c.is_ascii() { c } else { '?' }).collect();
     Text::from(plain.as_str())
 }
 
@@ -59,10 +50,8 @@ mod tests {
     fn an_image_comes_back_bit_by_bit() {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let path = folder.path().join("a.exr");
-        let image = Image {
-            size: [3, 2],
-            pixels: (0..6).map(|i| Vec3::new(i as f32, 0.1 * i as f32, 1e-20)).collect(),
-        };
+        let image =
+            Image { size: [3, 2], pixels: (0..6).map(|i| Vec3::new(i as f32, 0.1 * i as f32, 1e-20)).collect() };
         let provenance = Provenance {
             version: "1".into(),
             command: "cusp render ring".into(),

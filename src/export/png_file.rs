@@ -9,10 +9,7 @@ use std::path::Path;
 /// # Errors
 /// If the file cannot be written.
 pub fn write(path: &Path, size: [u32; 2], rgb: &[u8], provenance: &Provenance) -> Result<(), WriteError> {
-    let bytes = encode(size, rgb, provenance).map_err(|e| WriteError {
-        path: path.to_owned(),
-        why: e.to_string(),
-    })?;
+    let bytes = encode(size, rgb, provenance).map_err(|e| WriteError { path: path.to_owned(), why: e.to_string() })?;
     whole_file::write(path, &bytes)
 }
 

@@ -2,12 +2,12 @@
 
 use crate::export::Provenance;
 use crate::measure::ErrorMetrics;
+use crate::render::Plan;
 use crate::render::film::Rect;
 use crate::render::renderer::Renderer;
 use crate::render::settings::RenderSettings;
 use crate::render::stats::{Bounded, Seconds, StoredCounts, peak_rss_bytes};
 use crate::render::view_pass::PartSeconds;
-use crate::render::Plan;
 use serde::Serialize;
 use std::fmt::Write;
 
@@ -61,11 +61,7 @@ impl RenderReport {
             passes: renderer.passes(),
             photons_emitted: renderer.emitted(),
             photons_stored: renderer.stored(),
-            seconds: Seconds {
-                load,
-                total,
-                ..*renderer.seconds()
-            },
+            seconds: Seconds { load, total, ..*renderer.seconds() },
             peak_rss_bytes: peak_rss_bytes(),
             bounded: *renderer.bounded(),
             warnings: renderer.warnings(),

@@ -151,10 +151,7 @@ mod tests {
             title: title.into(),
             lines: vec!["1.0 s".into()],
             color: PALETTE[0],
-            image: Image {
-                size: [32, 32],
-                pixels: vec![Vec3::splat(0.5); 1024],
-            },
+            image: Image { size: [32, 32], pixels: vec![Vec3::splat(0.5); 1024] },
             error: error.then(|| Image::black([16, 12])),
         };
         draw(&Sheet {

@@ -23,10 +23,7 @@ pub enum Face {
 impl Canvas {
     /// A canvas of one colour.
     pub fn new(size: [u32; 2], color: [u8; 3]) -> Self {
-        Self {
-            size,
-            rgb: color.repeat(size[0] as usize * size[1] as usize),
-        }
+        Self { size, rgb: color.repeat(size[0] as usize * size[1] as usize) }
     }
 
     /// Fills a rectangle; what lies outside the canvas is left out.

@@ -23,21 +23,13 @@ pub fn auto_exposure(image: &Image) -> f32 {
 
 /// The image times `exposure` through the sRGB curve (IEC 61966-2-1), three bytes for each pixel.
 pub fn to_srgb(image: &Image, exposure: f32) -> Vec<u8> {
-    image
-        .pixels
-        .iter()
-        .flat_map(|p| (*p * exposure).to_array().map(srgb_byte))
-        .collect()
+    image.pixels.iter().flat_map(|p| (*p * exposure).to_array().map(srgb_byte)).collect()
 }
 
 /// A linear value as an sRGB byte; below 0 black, above 1 and NaN white.
 fn srgb_byte(x: f32) -> u8 {
     let x = if x.is_nan() { 1.0 } else { x.clamp(0.0, 1.0) };
-    let curved = if x <= 0.003_130_8 {
-        12.92 * x
-    } else {
-        1.055 * pow(x, 1.0 / 2.4) - 0.055
-    };
+    let curved = if x <= 0.003_130_8 { 12.92 * x } else { 1.055 * pow(x, 1.0 / 2.4) - 0.055 };
     (curved * 255.0 + 0.5) as u8
 }
 

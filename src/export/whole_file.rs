@@ -18,10 +18,7 @@ pub struct WriteError {
 /// # Errors
 /// Anything that the system refuses; then `path` is as it was.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
-    let wrong = |e: &dyn std::fmt::Display| WriteError {
-        path: path.to_owned(),
-        why: e.to_string(),
-    };
+    let wrong = |e: &dyn std::fmt::Display| WriteError { path: path.to_owned(), why: e.to_string() };
     let folder = match path.parent() {
         Some(p) if !p.as_os_str().is_empty() => p,
         _ => Path::new("."),

@@ -11,10 +11,7 @@ pub fn tangents(n: Vec3) -> (Vec3, Vec3) {
     let sign = 1.0_f32.copysign(n.z);
     let a = -1.0 / (sign + n.z);
     let b = n.x * n.y * a;
-    (
-        Vec3::new(1.0 + sign * n.x * n.x * a, sign * b, -sign * n.x),
-        Vec3::new(b, sign + n.y * n.y * a, -n.y),
-    )
+    (Vec3::new(1.0 + sign * n.x * n.x * a, sign * b, -sign * n.x), Vec3::new(b, sign + n.y * n.y * a, -n.y))
 }
 
 /// Direction with `cos` to the axis `n`, turned by `phi` radians about it. `n` must be a unit vector.
@@ -44,11 +41,7 @@ pub fn concentric_disc(u: f32, v: f32) -> (f32, f32) {
     if a == 0.0 && b == 0.0 {
         return (0.0, 0.0);
     }
-    let (r, phi) = if a.abs() > b.abs() {
-        (a, PI / 4.0 * (b / a))
-    } else {
-        (b, PI / 2.0 - PI / 4.0 * (a / b))
-    };
+    let (r, phi) = if a.abs() > b.abs() { (a, PI / 4.0 * (b / a)) } else { (b, PI / 2.0 - PI / 4.0 * (a / b)) };
     let (s, c) = sin_cos(phi);
     (r * c, r * s)
 }
@@ -56,11 +49,7 @@ pub fn concentric_disc(u: f32, v: f32) -> (f32, f32) {
 /// The unit vector along `v`, or `fallback` if `v` has no direction (zero, or not finite).
 pub fn unit_or(v: Vec3, fallback: Vec3) -> Vec3 {
     let m = v.abs().max_element();
-    if m > 0.0 && m.is_finite() {
-        (v / m).normalize()
-    } else {
-        fallback
-    }
+    if m > 0.0 && m.is_finite() { (v / m).normalize() } else { fallback }
 }
 
 #[cfg(test)]

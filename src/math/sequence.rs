@@ -70,10 +70,7 @@ mod tests {
             cells[(x[dims.0] * 16.0) as usize * 16 + (x[dims.1] * 16.0) as usize] += 1.0;
         }
         let expected = count as f64 / 256.0;
-        cells
-            .iter()
-            .map(|c| (c - expected).powi(2) / expected)
-            .sum()
+        cells.iter().map(|c| (c - expected).powi(2) / expected).sum()
     }
 
     #[test]

@@ -17,10 +17,7 @@ pub struct Mask {
 impl Mask {
     /// All pixels.
     pub fn all(size: [u32; 2]) -> Self {
-        Self {
-            size,
-            counts: vec![true; size[0] as usize * size[1] as usize],
-        }
+        Self { size, counts: vec![true; size[0] as usize * size[1] as usize] }
     }
 }
 
@@ -71,10 +68,7 @@ pub fn compare(image: &Image, reference: &Image, mask: &Mask) -> Result<ErrorMet
     let (own, reference_mean) = (mean(|(x, _)| x), mean(|(_, r)| r));
     let mse = mean(|(x, r)| (x - r) * (x - r));
     let epsilon = (0.01 * reference_mean).powi(2).max(f64::MIN_POSITIVE);
-    let relative_mse = counted()
-        .map(|(x, r)| sum((x - r) * (x - r) / (r * r + epsilon)))
-        .sum::<f64>()
-        / n;
+    let relative_mse = counted().map(|(x, r)| sum((x - r) * (x - r) / (r * r + epsilon))).sum::<f64>() / n;
     let over = |a: f64, zero: f64| {
         if reference_mean > 0.0 {
             a / reference_mean
@@ -141,10 +135,7 @@ mod tests {
     use super::*;
 
     fn grey(size: [u32; 2], values: &[f32]) -> Image {
-        Image {
-            size,
-            pixels: values.iter().map(|v| Rgb::splat(*v)).collect(),
-        }
+        Image { size, pixels: values.iter().map(|v| Rgb::splat(*v)).collect() }
     }
 
     #[test]
@@ -180,10 +171,7 @@ mod tests {
     #[test]
     fn blocks_average_their_valid_pixels() {
         let image = grey([4, 2], &[1.0, 3.0, 5.0, 7.0, 9.0, 9.0, 9.0, 9.0]);
-        let mask = Mask {
-            size: [4, 2],
-            counts: vec![true, true, true, false, false, false, false, false],
-        };
+        let mask = Mask { size: [4, 2], counts: vec![true, true, true, false, false, false, false, false] };
         let (small, kept) = block_average(&image, &mask, 2);
         assert_eq!(small.at(0, 0).x, 2.0);
         assert_eq!(kept.counts, vec![true, false]);

@@ -2,6 +2,7 @@
 
 pub mod metrics;
 pub mod reference;
+pub mod window;
 
 pub use metrics::{ErrorMetrics, Mask};
 pub use reference::Reference;

@@ -56,11 +56,7 @@ impl Reference {
                 mask.size[0], mask.size[1], image.size[0], image.size[1]
             ));
         }
-        Ok(Self {
-            source: reference.display().to_string(),
-            image,
-            mask,
-        })
+        Ok(Self { source: reference.display().to_string(), image, mask })
     }
 
     /// Error of an image against this reference. An image that is a whole number of times as large is averaged down.
@@ -86,18 +82,12 @@ impl Reference {
 
 fn linear(image: &DynamicImage) -> Image {
     let rgb = image.to_rgb32f();
-    Image {
-        size: [rgb.width(), rgb.height()],
-        pixels: rgb.pixels().map(|p| p.0.into()).collect(),
-    }
+    Image { size: [rgb.width(), rgb.height()], pixels: rgb.pixels().map(|p| p.0.into()).collect() }
 }
 
 fn mask_of(image: &DynamicImage) -> Mask {
     let grey = image.to_luma8();
-    Mask {
-        size: [grey.width(), grey.height()],
-        counts: grey.pixels().map(|p| p.0[0] >= 128).collect(),
-    }
+    Mask { size: [grey.width(), grey.height()], counts: grey.pixels().map(|p| p.0[0] >= 128).collect() }
 }
 
 #[cfg(test)]
@@ -123,11 +113,7 @@ mod tests {
 
     #[test]
     fn a_larger_image_is_averaged_down() {
-        let r = Reference {
-            source: String::new(),
-            image: Image::black([2, 2]),
-            mask: Mask::all([2, 2]),
-        };
+        let r = Reference { source: String::new(), image: Image::black([2, 2]), mask: Mask::all([2, 2]) };
         assert_eq!(r.error_of(&Image::black([4, 4])).expect("fits").mse, 0.0);
         assert!(r.error_of(&Image::black([3, 4])).is_err());
         assert!(r.error_of(&Image::black([1, 1])).is_err());

@@ -46,11 +46,7 @@ pub fn share_photons(scene: &Scene, total: u64, sequence: &Sequence) -> Vec<Ligh
             let x = f64::from(sequence.four(light as u64, 0)[0]);
             ((expected + x).floor().max(1.0) as u64, flux / total as f64)
         };
-        shares.push(LightShare {
-            light,
-            count,
-            power: (l.flux().as_dvec3() * (power / own)).as_vec3(),
-        });
+        shares.push(LightShare { light, count, power: (l.flux().as_dvec3() * (power / own)).as_vec3() });
     }
     shares
 }
@@ -88,16 +84,8 @@ pub fn emit(scene: &Scene, light: &Light, count: u64, x: [f32; 4]) -> Emission {
         }
     };
     match light {
-        Light::Point { position, .. } => {
-            from_point(*position, uniform_sphere(x[0], x[1]).normalize(), 4.0 * PI / n)
-        }
-        Light::Spot {
-            position,
-            direction: axis,
-            cos_half,
-            falloff,
-            ..
-        } => {
+        Light::Point { position, .. } => from_point(*position, uniform_sphere(x[0], x[1]).normalize(), 4.0 * PI / n),
+        Light::Spot { position, direction: axis, cos_half, falloff, .. } => {
             let whole = Light::spot_normalization(*cos_half, *falloff);
             let (cos, density) = spot_cosine(*cos_half, *falloff, whole, x[0]);
             from_point(*position, direction(*axis, cos, TAU * x[1]), 1.0 / (n * density))
@@ -110,30 +98,18 @@ pub fn emit(scene: &Scene, light: &Light, count: u64, x: [f32; 4]) -> Emission {
             let position = *center + *u * (2.0 * x[0] - 1.0) + *v * (2.0 * x[1] - 1.0);
             from_surface(position, u.cross(*v).normalize())
         }
-        Light::Mesh {
-            triangles,
-            cumulative_area,
-            ..
-        } => {
+        Light::Mesh { triangles, cumulative_area, .. } => {
             let (position, normal) = sample_triangles(triangles, cumulative_area, x[0], x[1]);
             from_surface(position, normal)
         }
-        Light::Directional {
-            direction,
-            disc_center,
-            disc_radius,
-            ..
-        } => {
+        Light::Directional { direction, disc_center, disc_radius, .. } => {
             let (t, b) = tangents(*direction);
             let (dx, dy) = concentric_disc(x[0], x[1]);
             let axis = disc_radius / n.sqrt();
             Emission {
                 origin: *disc_center + (t * dx + b * dy) * *disc_radius,
                 direction: *direction,
-                differential: Differential {
-                    dp: [t * axis, b * axis],
-                    dv: [Vec3::ZERO; 2],
-                },
+                differential: Differential { dp: [t * axis, b * axis], dv: [Vec3::ZERO; 2] },
                 bounded: false,
             }
         }
@@ -153,10 +129,7 @@ pub fn cone_radius(solid_angle: f32) -> f32 {
 fn cone_differential(direction: Vec3, solid_angle: f32) -> Differential {
     let (t, b) = tangents(direction);
     let r = cone_radius(solid_angle);
-    Differential {
-        dp: [Vec3::ZERO; 2],
-        dv: [t * r, b * r],
-    }
+    Differential { dp: [Vec3::ZERO; 2], dv: [t * r, b * r] }
 }
 
 /// Cosine to a spot's axis for a number in `[0, 1)`, and the density over solid angle there.
@@ -199,10 +172,7 @@ mod tests {
     }
 
     fn point(power: f32) -> Light {
-        Light::Point {
-            position: Vec3::Y,
-            power: Rgb::splat(power),
-        }
+        Light::Point { position: Vec3::Y, power: Rgb::splat(power) }
     }
 
     #[test]
@@ -241,7 +211,13 @@ mod tests {
         let lights = [
             (point(1.0), 4.0 * PI),
             (
-                Light::Spot { position: Vec3::Y, direction: Vec3::NEG_Y, cos_half: cone.cos(), falloff: 0.0, power: Rgb::ONE },
+                Light::Spot {
+                    position: Vec3::Y,
+                    direction: Vec3::NEG_Y,
+                    cos_half: cone.cos(),
+                    falloff: 0.0,
+                    power: Rgb::ONE,
+                },
                 TAU * (1.0 - cone.cos()),
             ),
         ];
@@ -288,10 +264,9 @@ mod tests {
                 power: Rgb::ONE,
             };
             let scene = plane_with(vec![light.clone()]);
-            let mean: f64 = (0..n)
-                .map(|i| f64::from(-emit(&scene, &light, n, sequence.four(i, 0)).direction.y))
-                .sum::<f64>()
-                / n as f64;
+            let mean: f64 =
+                (0..n).map(|i| f64::from(-emit(&scene, &light, n, sequence.four(i, 0)).direction.y)).sum::<f64>()
+                    / n as f64;
             let c = f64::from(half.cos());
             let m = f64::from(falloff);
             let expected = (1.0 - c.powf(m + 2.0)) / (m + 2.0) * (m + 1.0) / (1.0 - c.powf(m + 1.0));

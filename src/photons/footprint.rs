@@ -75,15 +75,8 @@ impl Principal {
         // The product of the singular values is the determinant, which does not cancel.
         let short = if long > 0.0 { a.cross(b).length() / long } else { 0.0 };
         // (cos θ, sin θ) of the right singular vector, from the half angle that does not cancel.
-        let (c, s) = if half_difference >= 0.0 {
-            (half_difference + root, ab)
-        } else {
-            (ab, root - half_difference)
-        };
-        let axis = (a * c + b * s)
-            .try_normalize()
-            .or(a.try_normalize())
-            .unwrap_or_else(|| n.any_orthonormal_vector());
+        let (c, s) = if half_difference >= 0.0 { (half_difference + root, ab) } else { (ab, root - half_difference) };
+        let axis = (a * c + b * s).try_normalize().or(a.try_normalize()).unwrap_or_else(|| n.any_orthonormal_vector());
         Self { long, short, axis }
     }
 }

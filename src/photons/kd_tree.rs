@@ -80,11 +80,8 @@ impl KdTree {
             }
             return;
         }
-        let (low, high) = entries
-            .iter()
-            .fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(l, h), (p, _)| {
-                (l.min(*p), h.max(*p))
-            });
+        let (low, high) =
+            entries.iter().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(l, h), (p, _)| (l.min(*p), h.max(*p)));
         let size = high - low;
         let axis = if size.x >= size.y && size.x >= size.z {
             0
@@ -94,20 +91,13 @@ impl KdTree {
             2
         };
         let middle = entries.len() / 2;
-        entries.select_nth_unstable_by(middle, |a, b| {
-            a.0[axis].total_cmp(&b.0[axis]).then(a.1.cmp(&b.1))
-        });
+        entries.select_nth_unstable_by(middle, |a, b| a.0[axis].total_cmp(&b.0[axis]).then(a.1.cmp(&b.1)));
         let split = entries[middle].0[axis];
         let (left, right) = entries.split_at_mut(middle);
         self.build(left);
         let right_child = self.nodes.len() as u32;
         self.build(right);
-        self.nodes[node] = Node {
-            split,
-            axis: axis as u32,
-            start: right_child,
-            count: 0,
-        };
+        self.nodes[node] = Node { split, axis: axis as u32, start: right_child, count: 0 };
     }
 
     /// Fills `found` with the `k` nearest entries in the query's sphere and slice that `accept` takes.
@@ -240,7 +230,7 @@ mod tests {
                         normal: crate::math::frame::uniform_sphere(y[0], y[1]),
                         slice: if q % 2 == 0 { f32::INFINITY } else { 0.1 },
                     };
-                    let accept = |i: u32| q % 5 != 0 || i % 3 != 0;
+                    let accept = |i: u32| q % 5 != 0 || !i.is_multiple_of(3);
                     tree.nearest(&query, &mut found, accept);
                     let mut got = found.clone().into_vec();
                     got.sort_unstable();

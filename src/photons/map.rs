@@ -116,17 +116,8 @@ impl PhotonMap {
         } else {
             (None, prepared.iter().map(|(p, _)| *p).collect::<Vec<_>>())
         };
-        let kd_tree = parts
-            .kd_tree
-            .then(|| KdTree::new(photons.iter().map(|p| p.position)));
-        Self {
-            photons,
-            kd_tree,
-            overlap,
-            longest_reach,
-            floored,
-            capped,
-        }
+        let kd_tree = parts.kd_tree.then(|| KdTree::new(photons.iter().map(|p| p.position)));
+        Self { photons, kd_tree, overlap, longest_reach, floored, capped }
     }
 
     /// The photons, in the map's order.
@@ -159,13 +150,7 @@ impl PhotonMap {
     fn nearest_in(&self, query: &Query, k: usize, radius: f32, slice: f32, heap: &mut Nearest) {
         heap.clear();
         let Some(tree) = &self.kd_tree else { return };
-        let nearest = NearestQuery {
-            center: query.center,
-            radius,
-            k,
-            normal: query.normal,
-            slice,
-        };
+        let nearest = NearestQuery { center: query.center, radius, k, normal: query.normal, slice };
         tree.nearest(&nearest, heap, |i| self.photons[i as usize].lights(query.normal));
     }
 
@@ -233,10 +218,7 @@ fn nearest_on_parallelogram(c: Vec3, a: Vec3, b: Vec3) -> f32 {
         let s = if squared > 0.0 { (-from.dot(edge) / squared).clamp(-1.0, 1.0) } else { 0.0 };
         (from + edge * s).length_squared()
     };
-    let nearest = along(c - b, a, aa)
-        .min(along(c + b, a, aa))
-        .min(along(c - a, b, bb))
-        .min(along(c + a, b, bb));
+    let nearest = along(c - b, a, aa).min(along(c + b, a, aa)).min(along(c - a, b, bb)).min(along(c + a, b, bb));
     nearest as f32
 }
 
@@ -246,11 +228,7 @@ mod tests {
     use crate::math::frame::{tangents, uniform_sphere};
     use crate::math::sequence::{Sampling, Sequence};
 
-    const LIMITS: FootprintLimits = FootprintLimits {
-        scale: 1.0,
-        floor: 1e-6,
-        ceiling: 10.0,
-    };
+    const LIMITS: FootprintLimits = FootprintLimits { scale: 1.0, floor: 1e-6, ceiling: 10.0 };
 
     fn random_photons(n: u64) -> Vec<Photon> {
         let sequence = Sequence::new(Sampling::Random, 8);
@@ -315,8 +293,9 @@ mod tests {
                         for s in 0..=n {
                             for t in 0..=n {
                                 let at = |k: i32| if n == 0 { 0.0 } else { f64::from(k) / f64::from(n) * 2.0 - 1.0 };
-                                let x = q.center.as_dvec3() + q.axes[0].as_dvec3() * at(s) + q.axes[1].as_dvec3() * at(t)
-                                    - p.position.as_dvec3();
+                                let x =
+                                    q.center.as_dvec3() + q.axes[0].as_dvec3() * at(s) + q.axes[1].as_dvec3() * at(t)
+                                        - p.position.as_dvec3();
                                 let f = p.rows.map(|r| r.as_dvec3().dot(x));
                                 least = least.min(f[0] * f[0] + f[1] * f[1] + f[2] * f[2]);
                             }

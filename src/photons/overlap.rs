@@ -26,11 +26,8 @@ impl OverlapTree {
         if boxes.is_empty() {
             return (Self { bvh: Bvh2::default() }, Vec::new());
         }
-        let parameters = if boxes.len() < 50_000 {
-            BvhBuildParams::fast_build()
-        } else {
-            BvhBuildParams::very_fast_build()
-        };
+        let parameters =
+            if boxes.len() < 50_000 { BvhBuildParams::fast_build() } else { BvhBuildParams::very_fast_build() };
         let bvh = build_bvh2(&boxes, parameters, &mut Duration::default());
         let order = bvh.primitive_indices.clone();
         (Self { bvh }, order)

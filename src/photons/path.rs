@@ -82,10 +82,7 @@ impl Flight<'_> {
         counts: &mut PathCounts,
     ) {
         let scene = self.scene;
-        let mut ray = Ray {
-            origin: emission.origin,
-            direction: emission.direction,
-        };
+        let mut ray = Ray { origin: emission.origin, direction: emission.direction };
         let mut d = emission.differential;
         let mut power = power;
         let mut kind = PhotonKind::Direct;
@@ -126,19 +123,14 @@ impl Flight<'_> {
                     let w = cosine_hemisphere(surface.normal, x[2], x[3]);
                     if self.settings.differentials {
                         let cos = w.dot(surface.normal);
-                        let (next, bounded) =
-                            spread::bounce(self.settings.spread, &d, v, w, cos, count);
+                        let (next, bounded) = spread::bounce(self.settings.spread, &d, v, w, cos, count);
                         d = next;
                         counts.grazing += u64::from(bounded);
                     }
-                    ray = Ray {
-                        origin: surface.leave(scene, w),
-                        direction: w,
-                    };
+                    ray = Ray { origin: surface.leave(scene, w), direction: w };
                 }
                 _ => {
-                    let Some((next, kept, beyond)) =
-                        self.specular(material, &surface, &ray, hit.t, power, &mut d, x)
+                    let Some((next, kept, beyond)) = self.specular(material, &surface, &ray, hit.t, power, &mut d, x)
                     else {
                         return;
                     };
@@ -184,21 +176,14 @@ impl Flight<'_> {
         let (next, weight, q) = if x[0] < reflect {
             (reflected(self.scene, surface, ray.direction, d), weights.reflected, reflect)
         } else if x[0] < reflect + refract {
-            (
-                refracted(self.scene, surface, ray.direction, d, weights.eta),
-                weights.refracted,
-                refract,
-            )
+            (refracted(self.scene, surface, ray.direction, d, weights.eta), weights.refracted, refract)
         } else {
             return None;
         };
         if self.settings.differentials {
             *d = next.differential;
         }
-        let ray = Ray {
-            origin: surface.leave(self.scene, next.direction),
-            direction: next.direction,
-        };
+        let ray = Ray { origin: surface.leave(self.scene, next.direction), direction: next.direction };
         Some((ray, power * weight / q, next.beyond_horizon))
     }
 }
@@ -206,12 +191,8 @@ impl Flight<'_> {
 /// Transmittance of the way just travelled, if it lay inside a dielectric that absorbs.
 pub fn attenuation(material: &Material, surface: &Surface, distance: f32) -> Option<Rgb> {
     match material {
-        Material::Dielectric { transmittance, .. }
-            if !surface.front && *transmittance != Rgb::ONE =>
-        {
-            Some(Rgb::from_array(
-                transmittance.to_array().map(|t| pow(t, distance)),
-            ))
+        Material::Dielectric { transmittance, .. } if !surface.front && *transmittance != Rgb::ONE => {
+            Some(Rgb::from_array(transmittance.to_array().map(|t| pow(t, distance))))
         }
         _ => None,
     }
@@ -220,11 +201,7 @@ pub fn attenuation(material: &Material, surface: &Surface, distance: f32) -> Opt
 /// Share of `power` that `weight` lets through, by the mean of the channels.
 fn share(power: Rgb, weight: Rgb) -> f32 {
     let whole = mean(power);
-    if whole > 0.0 {
-        (mean(power * weight) / whole).clamp(0.0, 1.0)
-    } else {
-        0.0
-    }
+    if whole > 0.0 { (mean(power * weight) / whole).clamp(0.0, 1.0) } else { 0.0 }
 }
 
 /// The power that survives `weight` for the number `x` in `[0, 1)`, its mean unchanged; None if it does not survive.

@@ -28,24 +28,12 @@ pub fn bounce(rule: DiffuseSpread, d: &Differential, v: Vec3, w: Vec3, cos: f32,
         DiffuseSpread::Polar => {
             let (solid_angle, bounded) = cosine_solid_angle(count as f32, cos);
             let r = cone_radius(solid_angle);
-            (
-                Differential {
-                    dp: d.dp,
-                    dv: polar_factor(d.dp, w).map(|c| c * r),
-                },
-                bounded,
-            )
+            (Differential { dp: d.dp, dv: polar_factor(d.dp, w).map(|c| c * r) }, bounded)
         }
         DiffuseSpread::AsPublished => {
             let turn = Quat::from_rotation_arc(v.normalize(), w.normalize());
             let grow = 2.0 * std::f32::consts::SQRT_2;
-            (
-                Differential {
-                    dp: d.dp.map(|c| c * grow),
-                    dv: d.dv.map(|c| turn * c),
-                },
-                false,
-            )
+            (Differential { dp: d.dp.map(|c| c * grow), dv: d.dv.map(|c| turn * c) }, false)
         }
     }
 }
@@ -55,10 +43,7 @@ pub fn bounce(rule: DiffuseSpread, d: &Differential, v: Vec3, w: Vec3, cos: f32,
 /// For a 2×2 matrix M, `M ± cof M` is the polar factor up to a positive scale, with the sign of `det M`.
 fn polar_factor(dp: [Vec3; 2], w: Vec3) -> [Vec3; 2] {
     let (t, b) = tangents(w);
-    let m = [
-        [t.dot(dp[0]), b.dot(dp[0])],
-        [t.dot(dp[1]), b.dot(dp[1])],
-    ];
+    let m = [[t.dot(dp[0]), b.dot(dp[0])], [t.dot(dp[1]), b.dot(dp[1])]];
     let sign = (m[0][0] * m[1][1] - m[0][1] * m[1][0] >= 0.0) as i8 as f32 * 2.0 - 1.0;
     let (c, s) = (m[0][0] + sign * m[1][1], m[0][1] - sign * m[1][0]);
     let scale = c.abs().max(s.abs());
@@ -98,14 +83,7 @@ mod tests {
 
     #[test]
     fn a_vanishing_footprint_spreads_as_a_disc() {
-        let (out, bounded) = bounce(
-            DiffuseSpread::Polar,
-            &Differential::default(),
-            Vec3::NEG_Y,
-            Vec3::Y,
-            1.0,
-            100,
-        );
+        let (out, bounded) = bounce(DiffuseSpread::Polar, &Differential::default(), Vec3::NEG_Y, Vec3::Y, 1.0, 100);
         assert!(!bounded);
         assert!((out.dv[0].length() - 0.1).abs() < 1e-6 && out.dv[0].dot(out.dv[1]).abs() < 1e-8);
     }

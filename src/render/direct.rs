@@ -46,10 +46,7 @@ pub fn irradiance(
             let x = sequence.four(index * u64::from(count) + u64::from(ray), LIGHT_SETS + i as u32);
             if let Some(sample) = sample(light, receiver, scene.radius, x[0], x[1]) {
                 let origin = receiver.position + receiver.normal * (scene.radius * SELF_INTERSECTION);
-                let towards = Ray {
-                    origin,
-                    direction: sample.direction,
-                };
+                let towards = Ray { origin, direction: sample.direction };
                 if !intersector.any(&towards, sample.distance) {
                     own += sample.irradiance;
                 }
@@ -71,13 +68,7 @@ struct LightSample {
 fn sample(light: &Light, r: &Receiver, scene_radius: f32, u: f32, v: f32) -> Option<LightSample> {
     match light {
         Light::Point { position, power } => towards(r, *position, |_| *power / (4.0 * PI)),
-        Light::Spot {
-            position,
-            direction,
-            cos_half,
-            falloff,
-            power,
-        } => {
+        Light::Spot { position, direction, cos_half, falloff, power } => {
             let axial = *power / Light::spot_normalization(*cos_half, *falloff);
             towards(r, *position, |w| {
                 let cos = -w.dot(*direction);
@@ -90,11 +81,7 @@ fn sample(light: &Light, r: &Receiver, scene_radius: f32, u: f32, v: f32) -> Opt
                 }
             })
         }
-        Light::Directional {
-            direction,
-            irradiance,
-            ..
-        } => {
+        Light::Directional { direction, irradiance, .. } => {
             let cos = -direction.dot(r.normal);
             (cos > 0.0).then(|| LightSample {
                 direction: -*direction,
@@ -103,21 +90,12 @@ fn sample(light: &Light, r: &Receiver, scene_radius: f32, u: f32, v: f32) -> Opt
             })
         }
         Light::Sphere { center, radius, .. } => sphere(r, *center, *radius, light.radiance(), u, v),
-        Light::Quad {
-            center,
-            u: eu,
-            v: ev,
-            ..
-        } => {
+        Light::Quad { center, u: eu, v: ev, .. } => {
             let position = *center + *eu * (2.0 * u - 1.0) + *ev * (2.0 * v - 1.0);
             let n = eu.cross(*ev);
             from_surface(r, position, n.normalize(), light.radiance() * (4.0 * n.length()))
         }
-        Light::Mesh {
-            triangles,
-            cumulative_area,
-            radiance,
-        } => {
+        Light::Mesh { triangles, cumulative_area, radiance } => {
             let (position, n) = sample_triangles(triangles, cumulative_area, u, v);
             from_surface(r, position, n, *radiance * *cumulative_area.last()?)
         }
@@ -144,9 +122,7 @@ fn towards(r: &Receiver, position: Vec3, intensity: impl Fn(Vec3) -> Rgb) -> Opt
 /// One point of a surface that stands for all of it; `radiance_area` is radiance times area.
 fn from_surface(r: &Receiver, position: Vec3, n: Vec3, radiance_area: Rgb) -> Option<LightSample> {
     let facing = -(position - r.position).normalize_or_zero().dot(n);
-    (facing > 0.0)
-        .then(|| towards(r, position, |_| radiance_area * facing))
-        .flatten()
+    (facing > 0.0).then(|| towards(r, position, |_| radiance_area * facing)).flatten()
 }
 
 /// A direction within the cone that a sphere fills, uniform over solid angle.
@@ -154,7 +130,8 @@ fn sphere(r: &Receiver, center: Vec3, radius: f32, radiance: Rgb, u: f32, v: f32
     let offset = center - r.position;
     let d2 = offset.length_squared();
     let sin2 = radius * radius / d2;
-    if !(sin2 < 1.0) {
+    // Inside the sphere, or at no distance that can be told.
+    if sin2 >= 1.0 || sin2.is_nan() {
         return None;
     }
     // 1 - cos without cancellation.
@@ -222,9 +199,8 @@ mod tests {
 
         let half = 0.5f32;
         let axis = -offset.normalize();
-        let spot = |falloff| {
-            lit_by(Light::Spot { position, direction: axis, cos_half: half.cos(), falloff, power }, at, 1)
-        };
+        let spot =
+            |falloff| lit_by(Light::Spot { position, direction: axis, cos_half: half.cos(), falloff, power }, at, 1);
         let omega = TAU * (1.0 - half.cos());
         assert!((spot(0.0) / (30.0 / omega * cos / (d * d)) - 1.0).abs() < 1e-4);
         let lobe = TAU * (1.0 - half.cos().powi(5)) / 5.0;

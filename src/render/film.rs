@@ -14,11 +14,7 @@ pub struct Film {
 impl Film {
     /// A black film of `size` pixels.
     pub fn new(size: [u32; 2]) -> Self {
-        Self {
-            size,
-            sum: vec![DVec3::ZERO; size[0] as usize * size[1] as usize],
-            passes: 0,
-        }
+        Self { size, sum: vec![DVec3::ZERO; size[0] as usize * size[1] as usize], passes: 0 }
     }
 
     /// Pixels across and down.
@@ -49,10 +45,7 @@ impl Film {
     /// The mean of the finished passes, radiance in W/(m² sr).
     pub fn image(&self) -> Image {
         let n = f64::from(self.passes.max(1));
-        Image {
-            size: self.size,
-            pixels: self.sum.iter().map(|s| (*s / n).as_vec3()).collect(),
-        }
+        Image { size: self.size, pixels: self.sum.iter().map(|s| (*s / n).as_vec3()).collect() }
     }
 }
 
@@ -81,22 +74,14 @@ pub struct Rect {
 impl Rect {
     /// All of an image.
     pub fn whole(size: [u32; 2]) -> Self {
-        Self {
-            x: 0,
-            y: 0,
-            width: size[0],
-            height: size[1],
-        }
+        Self { x: 0, y: 0, width: size[0], height: size[1] }
     }
 }
 
 impl Image {
     /// A black image.
     pub fn black(size: [u32; 2]) -> Self {
-        Self {
-            size,
-            pixels: vec![Rgb::ZERO; size[0] as usize * size[1] as usize],
-        }
+        Self { size, pixels: vec![Rgb::ZERO; size[0] as usize * size[1] as usize] }
     }
 
     /// The pixel at column `x`, row `y`, which must be inside.
@@ -112,10 +97,7 @@ impl Image {
                 self.pixels[start..start + rect.width as usize].iter().copied()
             })
             .collect();
-        Self {
-            size: [rect.width, rect.height],
-            pixels,
-        }
+        Self { size: [rect.width, rect.height], pixels }
     }
 
     /// Area average on another, smaller grid; each output pixel is the mean over what it covers.
@@ -173,10 +155,7 @@ mod tests {
 
     #[test]
     fn resampling_keeps_the_mean() {
-        let image = Image {
-            size: [6, 4],
-            pixels: (0..24).map(|i| Rgb::splat(i as f32)).collect(),
-        };
+        let image = Image { size: [6, 4], pixels: (0..24).map(|i| Rgb::splat(i as f32)).collect() };
         for size in [[3, 2], [4, 3], [1, 1], [6, 4]] {
             let small = image.resampled(size);
             let mean: f32 = small.pixels.iter().map(|p| p.x).sum::<f32>() / small.pixels.len() as f32;

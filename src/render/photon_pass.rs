@@ -105,11 +105,7 @@ impl PhotonMaps {
 
     /// The same with other structures than the plan's.
     pub fn with_parts(scene: &Scene, plan: &Plan, stored: &StoredPhotons, scale: f32, parts: MapParts) -> Self {
-        let limits = FootprintLimits {
-            scale,
-            floor: scene.resolution(),
-            ceiling: scene.radius,
-        };
+        let limits = FootprintLimits { scale, floor: scene.resolution(), ceiling: scene.radius };
         let build = |on: bool, photons: &[Photon]| on.then(|| PhotonMap::new(photons, limits, parts));
         Self {
             direct: build(plan.direct_map, &stored.direct),
@@ -125,8 +121,6 @@ impl PhotonMaps {
 
     /// Footprints raised to the floor and lowered to the ceiling in all maps.
     pub fn limited(&self) -> (u64, u64) {
-        self.all()
-            .map(PhotonMap::limited)
-            .fold((0, 0), |sum, l| (sum.0 + l.0, sum.1 + l.1))
+        self.all().map(PhotonMap::limited).fold((0, 0), |sum, l| (sum.0 + l.0, sum.1 + l.1))
     }
 }

@@ -114,10 +114,8 @@ impl Plan {
                 _ => "for direct light".into(),
             },
         );
-        let has_area = scene
-            .lights
-            .iter()
-            .any(|l| matches!(l, Light::Sphere { .. } | Light::Quad { .. } | Light::Mesh { .. }));
+        let has_area =
+            scene.lights.iter().any(|l| matches!(l, Light::Sphere { .. } | Light::Quad { .. } | Light::Mesh { .. }));
         let emission = item(
             "lights seen by the camera",
             shows(LightPart::Direct) && has_area,
@@ -152,7 +150,11 @@ impl Plan {
         let kd_tree = item(
             "kd-tree",
             any_map && slots.iter().any(uses_knn),
-            if slots.iter().any(uses_knn) { "for the k nearest".into() } else { "nothing looks up the k nearest".into() },
+            if slots.iter().any(uses_knn) {
+                "for the k nearest".into()
+            } else {
+                "nothing looks up the k nearest".into()
+            },
         );
         let by_overlap = slots.iter().any(|s| !uses_knn(s));
         let overlap = item(
@@ -199,10 +201,7 @@ impl Plan {
 
     /// The structures that maps need.
     pub fn map_parts(&self) -> MapParts {
-        MapParts {
-            kd_tree: self.kd_tree,
-            overlap: self.overlap,
-        }
+        MapParts { kd_tree: self.kd_tree, overlap: self.overlap }
     }
 }
 
@@ -234,18 +233,8 @@ fn pilot(scene: &Scene, intersector: &Intersector, settings: &RenderSettings) ->
         differentials: false,
         spread: settings.diffuse_spread,
     };
-    let emitter = Emitter {
-        scene,
-        intersector,
-        path,
-        sampling: settings.sampling,
-        photons: PILOT_PHOTONS,
-        seed: settings.seed,
-    };
+    let emitter =
+        Emitter { scene, intersector, path, sampling: settings.sampling, photons: PILOT_PHOTONS, seed: settings.seed };
     let pass = emitter.run(photon_pass::PILOT_PASS, &|| false);
-    Pilot {
-        emitted: pass.emitted,
-        caustic: pass.stored.caustic.len() as u64,
-        global: pass.stored.global.len() as u64,
-    }
+    Pilot { emitted: pass.emitted, caustic: pass.stored.caustic.len() as u64, global: pass.stored.global.len() as u64 }
 }

@@ -18,9 +18,7 @@ pub const ALPHA: f64 = 2.0 / 3.0;
 
 /// Area of the footprints of pass `pass` (from 0) relative to the first: `∏ (i + α)/(i + 1)`.
 pub fn area_factor(pass: u32) -> f64 {
-    (1..=pass).fold(1.0, |area, i| {
-        area * (f64::from(i) + ALPHA) / (f64::from(i) + 1.0)
-    })
+    (1..=pass).fold(1.0, |area, i| area * (f64::from(i) + ALPHA) / (f64::from(i) + 1.0))
 }
 
 /// What callers are asked and told while a pass runs, from any thread.
@@ -33,10 +31,7 @@ pub struct Watch<'a> {
 
 impl Watch<'static> {
     /// Never stops, tells nobody.
-    pub const SILENT: Self = Self {
-        cancelled: &|| false,
-        tile_done: &|| {},
-    };
+    pub const SILENT: Self = Self { cancelled: &|| false, tile_done: &|| {} };
 }
 
 /// How a step ended.
@@ -88,11 +83,7 @@ impl Renderer {
             estimators,
             plan,
             last: None,
-            seconds: Seconds {
-                bvh,
-                plan: planned,
-                ..Default::default()
-            },
+            seconds: Seconds { bvh, plan: planned, ..Default::default() },
             emitted: 0,
             stored: StoredCounts::default(),
             bounded: Bounded::default(),
@@ -122,9 +113,12 @@ impl Renderer {
         let map_build = start.elapsed().as_secs_f64();
 
         let region = Rect::whole(self.settings.size);
-        let result = self
-            .view_pass(&maps, pass)
-            .run(region, &slots(&self.estimators, self.settings.gather), watch.cancelled, watch.tile_done);
+        let result = self.view_pass(&maps, pass).run(
+            region,
+            &slots(&self.estimators, self.settings.gather),
+            watch.cancelled,
+            watch.tile_done,
+        );
         if !result.complete {
             return Step::Cancelled;
         }
@@ -279,10 +273,7 @@ impl Renderer {
 pub fn slots(estimators: &[Box<dyn Estimator>], gather: Gather) -> Vec<Slot<'_>> {
     estimators
         .iter()
-        .map(|e| Slot {
-            estimator: e.as_ref(),
-            gather: if e.lookup() == Lookup::Disc { Gather::Knn } else { gather },
-        })
+        .map(|e| Slot { estimator: e.as_ref(), gather: if e.lookup() == Lookup::Disc { Gather::Knn } else { gather } })
         .collect()
 }
 

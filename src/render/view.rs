@@ -75,13 +75,7 @@ impl ViewTracer<'_> {
     ) -> Rgb {
         let mut radiance = Rgb::ZERO;
         stack.clear();
-        stack.push(Branch {
-            ray,
-            differential,
-            throughput: Rgb::ONE,
-            depth: 0,
-            specular: 0,
-        });
+        stack.push(Branch { ray, differential, throughput: Rgb::ONE, depth: 0, specular: 0 });
         while let Some(mut branch) = stack.pop() {
             let Some(hit) = self.intersector.closest(&branch.ray) else {
                 continue;
@@ -101,13 +95,9 @@ impl ViewTracer<'_> {
                     }
                 }
                 Material::Diffuse { .. } => {
-                    let weight =
-                        branch.throughput * material.diffuse_reflectance(surface.uv) * FRAC_1_PI;
+                    let weight = branch.throughput * material.diffuse_reflectance(surface.uv) * FRAC_1_PI;
                     if self.plan.shadow_rays {
-                        let receiver = Receiver {
-                            position: surface.position,
-                            normal: surface.normal,
-                        };
+                        let receiver = Receiver { position: surface.position, normal: surface.normal };
                         radiance += weight
                             * direct::irradiance(
                                 self.scene,
@@ -174,10 +164,7 @@ impl ViewTracer<'_> {
             let throughput = throughput * weight;
             if throughput != Rgb::ZERO {
                 stack.push(Branch {
-                    ray: Ray {
-                        origin: surface.leave(self.scene, next.direction),
-                        direction: next.direction,
-                    },
+                    ray: Ray { origin: surface.leave(self.scene, next.direction), direction: next.direction },
                     differential: next.differential,
                     throughput,
                     depth: branch.depth + 1,
@@ -210,16 +197,10 @@ impl ViewTracer<'_> {
 /// Position of a view ray in its pixel: the centre of cell `(i, j)` of `n`×`n`, or a random point of the cell.
 pub fn sample_position(pixel: [u32; 2], cell: [u32; 2], n: u32, jitter: Option<[f32; 2]>) -> (f32, f32) {
     let [u, v] = jitter.unwrap_or([0.5; 2]);
-    (
-        pixel[0] as f32 + (cell[0] as f32 + u) / n as f32,
-        pixel[1] as f32 + (cell[1] as f32 + v) / n as f32,
-    )
+    (pixel[0] as f32 + (cell[0] as f32 + u) / n as f32, pixel[1] as f32 + (cell[1] as f32 + v) / n as f32)
 }
 
 /// The query at a hit without its footprint.
 pub fn at_point(query: &Query) -> Query {
-    Query {
-        axes: [Vec3::ZERO; 2],
-        ..*query
-    }
+    Query { axes: [Vec3::ZERO; 2], ..*query }
 }

@@ -125,10 +125,7 @@ impl ViewPass<'_> {
         let wall = start.elapsed().as_secs_f64();
         let tiles: Vec<TileResult> = results.into_iter().flatten().collect();
         let complete = tiles.len() == all.len();
-        let spent: f64 = tiles
-            .iter()
-            .flat_map(|t| t.images.iter().map(|i| i.seconds.total()))
-            .sum();
+        let spent: f64 = tiles.iter().flat_map(|t| t.images.iter().map(|i| i.seconds.total())).sum();
         let scale = if spent > 0.0 { wall / spent } else { 0.0 };
         let mut seconds = vec![PartSeconds::default(); slots.len()];
         let mut gathered = vec![0; slots.len()];
@@ -141,14 +138,7 @@ impl ViewPass<'_> {
                 gathered[i] += image.gathered;
             }
         }
-        ViewResult {
-            tiles,
-            seconds,
-            wall,
-            gathered,
-            counts,
-            complete,
-        }
+        ViewResult { tiles, seconds, wall, gathered, counts, complete }
     }
 
     /// One tile. Slots take turns at being first, so that none always finds the caches cold.
@@ -200,10 +190,7 @@ impl ViewPass<'_> {
                 });
                 let (px, py) = sample_position([x, y], [cell % n, cell / n], n, jitter);
                 let (direction, differential) = camera.ray(px, py, size, half);
-                let ray = Ray {
-                    origin: camera.position,
-                    direction,
-                };
+                let ray = Ray { origin: camera.position, direction };
                 *sum += t.trace(
                     ray,
                     differential,
@@ -239,11 +226,8 @@ impl ViewPass<'_> {
         for hit in &scratch.hits {
             let mut irradiance = Rgb::ZERO;
             for (map, &(from, to, radius)) in self.maps.all().zip(spans.by_ref()) {
-                let gathered = Gathered {
-                    photons: map.photons(),
-                    indices: &scratch.indices[from as usize..to as usize],
-                    radius,
-                };
+                let gathered =
+                    Gathered { photons: map.photons(), indices: &scratch.indices[from as usize..to as usize], radius };
                 irradiance += slot.estimator.irradiance(&gathered, &hit.view);
             }
             sums[hit.pixel as usize] += (irradiance * hit.weight).as_dvec3();
@@ -253,11 +237,7 @@ impl ViewPass<'_> {
         let estimate = start.elapsed().as_secs_f64();
         TileImage {
             pixels,
-            seconds: PartSeconds {
-                view_trace: 0.0,
-                gather,
-                estimate,
-            },
+            seconds: PartSeconds { view_trace: 0.0, gather, estimate },
             gathered: scratch.indices.len() as u64,
         }
     }

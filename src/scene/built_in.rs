@@ -90,9 +90,5 @@ pub fn find(name: &str) -> Option<&'static BuiltIn> {
 
 /// Names of all built-in scenes, separated by commas.
 pub fn names() -> String {
-    BUILT_IN
-        .iter()
-        .map(|b| b.name)
-        .collect::<Vec<_>>()
-        .join(", ")
+    BUILT_IN.iter().map(|b| b.name).collect::<Vec<_>>().join(", ")
 }

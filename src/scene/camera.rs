@@ -24,20 +24,12 @@ impl Camera {
     pub fn ray(&self, x: f32, y: f32, size: [u32; 2], half: f32) -> (Vec3, Differential) {
         let [right, up, forward] = self.frame;
         let step = 2.0 * self.tan_half_fov_y / size[1] as f32;
-        let v = forward
-            + right * ((x - size[0] as f32 / 2.0) * step)
-            + up * ((size[1] as f32 / 2.0 - y) * step);
+        let v = forward + right * ((x - size[0] as f32 / 2.0) * step) + up * ((size[1] as f32 / 2.0 - y) * step);
         let length = v.length();
         let direction = v / length;
         let along = |dx: Vec3| (dx - direction * direction.dot(dx)) / length;
         let dv = [along(right * (step * half)), along(up * (-step * half))];
-        (
-            direction,
-            Differential {
-                dp: [Vec3::ZERO; 2],
-                dv,
-            },
-        )
+        (direction, Differential { dp: [Vec3::ZERO; 2], dv })
     }
 }
 
@@ -60,10 +52,7 @@ mod tests {
             let (p, _) = camera.ray(11.3 + dx, 40.2 + dy, size, 0.5);
             let (m, _) = camera.ray(11.3 - dx, 40.2 - dy, size, 0.5);
             let finite = (p - m) / (2.0 * h) * 0.5;
-            assert!(
-                (finite - d.dv[axis]).length() < 1e-3 * d.dv[axis].length(),
-                "{axis}"
-            );
+            assert!((finite - d.dv[axis]).length() < 1e-3 * d.dv[axis].length(), "{axis}");
         }
     }
 }

@@ -83,11 +83,7 @@ impl Light {
                 cumulative_area.push(sum as f32);
             }
         }
-        Self::Mesh {
-            triangles: kept,
-            cumulative_area,
-            radiance,
-        }
+        Self::Mesh { triangles: kept, cumulative_area, radiance }
     }
 
     /// Radiant flux Φ per channel, W.
@@ -97,16 +93,10 @@ impl Light {
             | Self::Sphere { power, .. }
             | Self::Quad { power, .. }
             | Self::Spot { power, .. } => *power,
-            Self::Directional {
-                irradiance,
-                disc_radius,
-                ..
-            } => *irradiance * (PI * disc_radius * disc_radius),
-            Self::Mesh {
-                cumulative_area,
-                radiance,
-                ..
-            } => *radiance * (PI * cumulative_area.last().copied().unwrap_or(0.0)),
+            Self::Directional { irradiance, disc_radius, .. } => *irradiance * (PI * disc_radius * disc_radius),
+            Self::Mesh { cumulative_area, radiance, .. } => {
+                *radiance * (PI * cumulative_area.last().copied().unwrap_or(0.0))
+            }
         }
     }
 

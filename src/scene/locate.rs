@@ -14,22 +14,13 @@ pub struct Locator<'a> {
 impl<'a> Locator<'a> {
     /// Prepares `text` for look-ups; `file` is only named.
     pub fn new(file: &Path, text: &'a str) -> Self {
-        Self {
-            file: file.to_owned(),
-            text,
-            table: DeTable::parse(text).ok(),
-        }
+        Self { file: file.to_owned(), text, table: DeTable::parse(text).ok() }
     }
 
     /// An error at `key`, written as in `lights[0].power`. A key that is not there is placed at its nearest parent.
     pub fn error(&self, key: impl Into<String>, what: impl Into<String>) -> SceneError {
         let key = key.into();
-        SceneError::At {
-            line: self.line_of(&key),
-            file: self.file.clone(),
-            key,
-            what: what.into(),
-        }
+        SceneError::At { line: self.line_of(&key), file: self.file.clone(), key, what: what.into() }
     }
 
     /// The parser's error as ours: its first sentence, on its line.
@@ -61,10 +52,7 @@ impl<'a> Locator<'a> {
 
     fn line_at(&self, byte: usize) -> usize {
         let end = byte.min(self.text.len());
-        1 + self.text.as_bytes()[..end]
-            .iter()
-            .filter(|&&b| b == b'\n')
-            .count()
+        1 + self.text.as_bytes()[..end].iter().filter(|&&b| b == b'\n').count()
     }
 
     fn line_of(&self, key: &str) -> usize {
@@ -74,14 +62,10 @@ impl<'a> Locator<'a> {
         for part in key.split(['.', '[', ']']).filter(|p| !p.is_empty()) {
             let next = match at {
                 Some(Node::Table(t)) => t.get_key_value(part).map(|(k, v)| (k.span(), v)),
-                Some(Node::Value(DeValue::Table(t))) => {
-                    t.get_key_value(part).map(|(k, v)| (k.span(), v))
+                Some(Node::Value(DeValue::Table(t))) => t.get_key_value(part).map(|(k, v)| (k.span(), v)),
+                Some(Node::Value(DeValue::Array(a))) => {
+                    part.parse().ok().and_then(|i: usize| a.get(i)).map(|v| (v.span(), v))
                 }
-                Some(Node::Value(DeValue::Array(a))) => part
-                    .parse()
-                    .ok()
-                    .and_then(|i: usize| a.get(i))
-                    .map(|v| (v.span(), v)),
                 _ => None,
             };
             let Some((found, value)) = next else { break };

@@ -42,10 +42,7 @@ pub enum Material {
 impl Material {
     /// Whether light leaves in at most two directions.
     pub fn is_specular(&self) -> bool {
-        matches!(
-            self,
-            Self::Mirror { .. } | Self::Metal { .. } | Self::Dielectric { .. }
-        )
+        matches!(self, Self::Mirror { .. } | Self::Metal { .. } | Self::Dielectric { .. })
     }
 
     /// Whether it scatters light in all directions.
@@ -56,10 +53,7 @@ impl Material {
     /// Diffuse reflectance at the texture coordinates `uv`; black for other kinds.
     pub fn diffuse_reflectance(&self, uv: Vec2) -> Rgb {
         match self {
-            Self::Diffuse {
-                reflectance,
-                texture,
-            } => match texture {
+            Self::Diffuse { reflectance, texture } => match texture {
                 Some(t) => *reflectance * t.sample(uv),
                 None => *reflectance,
             },

@@ -65,17 +65,12 @@ impl Scene {
 
     /// Sum of the lights' fluxes, the mean of the channels, W.
     pub fn total_flux(&self) -> f64 {
-        self.lights
-            .iter()
-            .map(|l| f64::from(crate::math::rgb::mean(l.flux())))
-            .sum()
+        self.lights.iter().map(|l| f64::from(crate::math::rgb::mean(l.flux()))).sum()
     }
 
     /// Whether any surface reflects or refracts without scattering.
     pub fn has_specular(&self) -> bool {
-        self.geometry
-            .used_materials()
-            .any(|m| self.materials[m].is_specular())
+        self.geometry.used_materials().any(|m| self.materials[m].is_specular())
     }
 }
 

@@ -40,18 +40,11 @@ const MAX_FAN: usize = 256;
 pub fn read(path: &Path, text: &str, crease_angle: f64) -> Result<ObjFile, ObjError> {
     check_lines(text)?;
     let whole = |what: String| ObjError { line: 0, what };
-    let options = tobj::LoadOptions {
-        triangulate: true,
-        ignore_points: true,
-        ignore_lines: true,
-        single_index: false,
-        ..Default::default()
-    };
+    let options = tobj::LoadOptions { triangulate: true, ignore_points: true, ignore_lines: true, single_index: false };
     let folder = path.parent().unwrap_or(Path::new("")).to_owned();
     let material_text = std::cell::RefCell::new(String::new());
     let (models, materials) = tobj::load_obj_buf(&mut text.as_bytes(), &options, |name| {
-        let read = std::fs::read_to_string(folder.join(name))
-            .map_err(|_| tobj::LoadError::OpenFileFailed)?;
+        let read = std::fs::read_to_string(folder.join(name)).map_err(|_| tobj::LoadError::OpenFileFailed)?;
         material_text.borrow_mut().push_str(&read);
         tobj::load_mtl_buf(&mut read.as_bytes())
     })
@@ -72,10 +65,7 @@ pub fn read(path: &Path, text: &str, crease_angle: f64) -> Result<ObjFile, ObjEr
     add_missing_normals(&mut mesh, crease_angle);
     Ok(ObjFile {
         mesh,
-        materials: materials
-            .iter()
-            .map(|m| (m.name.clone(), material_of(m)))
-            .collect(),
+        materials: materials.iter().map(|m| (m.name.clone(), material_of(m))).collect(),
         material_text: material_text.into_inner(),
         warnings,
     })
@@ -85,12 +75,7 @@ pub fn read(path: &Path, text: &str, crease_angle: f64) -> Result<ObjFile, ObjEr
 fn check_lines(text: &str) -> Result<(), ObjError> {
     let mut counts: HashMap<&str, i64> = HashMap::new();
     for (index, line) in text.lines().enumerate() {
-        let wrong = |what: String| {
-            Err(ObjError {
-                line: index + 1,
-                what,
-            })
-        };
+        let wrong = |what: String| Err(ObjError { line: index + 1, what });
         let mut words = line.split_whitespace();
         match words.next() {
             Some(kind @ ("v" | "vn" | "vt")) => {
@@ -102,9 +87,7 @@ fn check_lines(text: &str) -> Result<(), ObjError> {
                     }
                 }
                 if numbers < if kind == "vt" { 1 } else { 3 } {
-                    return wrong(format!(
-                        "`{kind}` has {numbers} numbers, too few; is the file cut off?"
-                    ));
+                    return wrong(format!("`{kind}` has {numbers} numbers, too few; is the file cut off?"));
                 }
                 *counts.entry(kind).or_default() += 1;
             }
@@ -137,20 +120,11 @@ fn check_lines(text: &str) -> Result<(), ObjError> {
 }
 
 fn append(mesh: &mut Mesh, part: &tobj::Mesh) {
-    let triples = |v: &[f64]| -> Vec<DVec3> {
-        v.chunks_exact(3)
-            .map(|c| DVec3::new(c[0], c[1], c[2]))
-            .collect()
-    };
-    let (p0, n0, t0) = (
-        mesh.positions.len() as u32,
-        mesh.normals.len() as u32,
-        mesh.uvs.len() as u32,
-    );
+    let triples = |v: &[f64]| -> Vec<DVec3> { v.chunks_exact(3).map(|c| DVec3::new(c[0], c[1], c[2])).collect() };
+    let (p0, n0, t0) = (mesh.positions.len() as u32, mesh.normals.len() as u32, mesh.uvs.len() as u32);
     mesh.positions.extend(triples(&part.positions));
     mesh.normals.extend(triples(&part.normals));
-    mesh.uvs
-        .extend(part.texcoords.chunks_exact(2).map(|c| DVec2::new(c[0], c[1])));
+    mesh.uvs.extend(part.texcoords.chunks_exact(2).map(|c| DVec2::new(c[0], c[1])));
     let material = part.material_id.map_or(NONE, |m| m as u32);
     let corner = |indices: &[u32], base: u32, at: usize| -> [u32; 3] {
         match indices.get(at..at + 3) {
@@ -161,10 +135,7 @@ fn append(mesh: &mut Mesh, part: &tobj::Mesh) {
     for at in (0..part.indices.len() / 3 * 3).step_by(3) {
         mesh.triangles.push(corner(&part.indices, p0, at));
         let mut normals = corner(&part.normal_indices, n0, at);
-        if normals
-            .iter()
-            .any(|&n| n == NONE || mesh.normals[n as usize].length_squared() == 0.0)
-        {
+        if normals.iter().any(|&n| n == NONE || mesh.normals[n as usize].length_squared() == 0.0) {
             normals = [NONE; 3];
         }
         mesh.corner_normals.push(normals);
@@ -176,9 +147,7 @@ fn append(mesh: &mut Mesh, part: &tobj::Mesh) {
 /// Gives corners without a normal the mean over the faces around their vertex that bend by less than the crease
 /// angle, weighted by the angle at the corner. Faces that turn out flat keep no normals.
 fn add_missing_normals(mesh: &mut Mesh, crease_angle: f64) {
-    let missing: Vec<usize> = (0..mesh.triangles.len())
-        .filter(|&t| mesh.corner_normals[t][0] == NONE)
-        .collect();
+    let missing: Vec<usize> = (0..mesh.triangles.len()).filter(|&t| mesh.corner_normals[t][0] == NONE).collect();
     if missing.is_empty() || crease_angle <= 0.0 {
         return;
     }
@@ -231,10 +200,7 @@ fn material_of(m: &tobj::Material) -> MaterialFile {
         _ if m.dissolve.is_some_and(|d| d < 1.0) => "dielectric",
         _ => "diffuse",
     };
-    let mut file = MaterialFile {
-        kind: kind.into(),
-        ..Default::default()
-    };
+    let mut file = MaterialFile { kind: kind.into(), ..Default::default() };
     match kind {
         "emissive" => file.radiance = Some(emission),
         "mirror" | "metal" => file.reflectance = Some(m.specular.unwrap_or([1.0; 3])),

@@ -36,18 +36,9 @@ impl Mesh {
         let base = self.positions.len() as u32;
         let uv = self.uvs.len() as u32;
         self.positions.extend(corners);
-        self.uvs.extend([
-            DVec2::ZERO,
-            DVec2::X,
-            DVec2::ONE,
-            DVec2::Y,
-        ]);
+        self.uvs.extend([DVec2::ZERO, DVec2::X, DVec2::ONE, DVec2::Y]);
         for [a, b, c] in [[0, 1, 2], [0, 2, 3]] {
-            self.add(
-                [base + a, base + b, base + c],
-                [NONE; 3],
-                [uv + a, uv + b, uv + c],
-            );
+            self.add([base + a, base + b, base + c], [NONE; 3], [uv + a, uv + b, uv + c]);
         }
     }
 
@@ -90,11 +81,7 @@ impl Placement {
 pub fn rotation(axis: DVec3, degrees: f64) -> DMat3 {
     let a = axis.normalize();
     let (s, c) = libm::sincos(degrees.to_radians());
-    let k = DMat3::from_cols(
-        DVec3::new(0.0, a.z, -a.y),
-        DVec3::new(-a.z, 0.0, a.x),
-        DVec3::new(a.y, -a.x, 0.0),
-    );
+    let k = DMat3::from_cols(DVec3::new(0.0, a.z, -a.y), DVec3::new(-a.z, 0.0, a.x), DVec3::new(a.y, -a.x, 0.0));
     DMat3::IDENTITY + k * s + k * k * (1.0 - c)
 }
 
@@ -109,14 +96,7 @@ pub fn quad(center: DVec3, u: DVec3, v: DVec3) -> Mesh {
 pub fn cuboid(half: DVec3) -> Mesh {
     let mut mesh = Mesh::default();
     let (x, y, z) = (DVec3::X * half.x, DVec3::Y * half.y, DVec3::Z * half.z);
-    for (w, u, v) in [
-        (x, y, z),
-        (-x, z, y),
-        (y, z, x),
-        (-y, x, z),
-        (z, x, y),
-        (-z, y, x),
-    ] {
+    for (w, u, v) in [(x, y, z), (-x, z, y), (y, z, x), (-y, x, z), (z, x, y), (-z, y, x)] {
         mesh.add_quad([w - u - v, w + u - v, w + u + v, w - u + v]);
     }
     mesh
@@ -129,8 +109,7 @@ pub fn ring(inner: f64, outer: f64, height: f64, segments: u32) -> Mesh {
         let (s, c) = libm::sincos(TAU * f64::from(i) / f64::from(segments));
         let out = DVec3::new(c, 0.0, s);
         let up = DVec3::Y * height;
-        mesh.positions
-            .extend([out * inner, out * inner + up, out * outer, out * outer + up]);
+        mesh.positions.extend([out * inner, out * inner + up, out * outer, out * outer + up]);
         mesh.normals.extend([-out, out]);
     }
     for i in 0..segments {

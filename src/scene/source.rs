@@ -80,10 +80,7 @@ pub fn open(name: &str) -> Result<Scene, SceneError> {
             file: path.to_owned(),
             what: "Quake 3 maps cannot be read yet; convert it to OBJ".into(),
         }),
-        _ => Err(SceneError::Unknown {
-            name: name.to_owned(),
-            known: built_in::names(),
-        }),
+        _ => Err(SceneError::Unknown { name: name.to_owned(), known: built_in::names() }),
     }
 }
 
@@ -98,7 +95,5 @@ pub fn open_built_in(b: &BuiltIn) -> Result<Scene, SceneError> {
 
 /// Hash of texts in their order.
 pub fn hash_of(texts: &[&str]) -> u64 {
-    texts
-        .iter()
-        .fold(FNV_START, |h, t| fnv1a(fnv1a(h, t.as_bytes()), &[0]))
+    texts.iter().fold(FNV_START, |h, t| fnv1a(fnv1a(h, t.as_bytes()), &[0]))
 }

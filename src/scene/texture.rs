@@ -22,10 +22,7 @@ impl Texture {
         let table: Vec<f32> = (0..256).map(|i| srgb_to_linear(i as f32 / 255.0)).collect();
         Ok(Self {
             size: [image.width(), image.height()],
-            texels: image
-                .pixels()
-                .map(|p| Rgb::from_array(p.0.map(|c| table[c as usize])))
-                .collect(),
+            texels: image.pixels().map(|p| Rgb::from_array(p.0.map(|c| table[c as usize]))).collect(),
         })
     }
 
@@ -52,11 +49,7 @@ impl Texture {
 
 /// Inverse of the sRGB transfer curve (IEC 61966-2-1).
 pub fn srgb_to_linear(c: f32) -> f32 {
-    if c <= 0.04045 {
-        c / 12.92
-    } else {
-        pow((c + 0.055) / 1.055, 2.4)
-    }
+    if c <= 0.04045 { c / 12.92 } else { pow((c + 0.055) / 1.055, 2.4) }
 }
 
 #[cfg(test)]
@@ -65,17 +58,11 @@ mod tests {
 
     #[test]
     fn samples_texel_centres_and_repeats() {
-        let t = Texture {
-            size: [2, 2],
-            texels: vec![Rgb::X, Rgb::Y, Rgb::Z, Rgb::ONE],
-        };
+        let t = Texture { size: [2, 2], texels: vec![Rgb::X, Rgb::Y, Rgb::Z, Rgb::ONE] };
         assert_eq!(t.sample(Vec2::new(0.25, 0.75)), Rgb::X);
         assert_eq!(t.sample(Vec2::new(0.75, 0.75)), Rgb::Y);
         assert_eq!(t.sample(Vec2::new(0.25, 0.25)), Rgb::Z);
         assert_eq!(t.sample(Vec2::new(-0.25, 1.25)), Rgb::ONE);
-        assert_eq!(
-            t.sample(Vec2::new(0.5, 0.5)),
-            (Rgb::X + Rgb::Y + Rgb::Z + Rgb::ONE) / 4.0
-        );
+        assert_eq!(t.sample(Vec2::new(0.5, 0.5)), (Rgb::X + Rgb::Y + Rgb::Z + Rgb::ONE) / 4.0);
     }
 }

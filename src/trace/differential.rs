@@ -23,36 +23,23 @@ impl Differential {
     /// (Pedersen 2011, eq. 26 corrected). `dv` stays.
     pub fn transfer(&self, v: Vec3, n: Vec3, s: f32) -> Self {
         let (v, n) = (v.as_dvec3(), n.as_dvec3());
-        let column = |i: usize| {
-            transfer(v, n, f64::from(s), self.dp[i].as_dvec3(), self.dv[i].as_dvec3()).as_vec3()
-        };
-        Self {
-            dp: [column(0), column(1)],
-            dv: self.dv,
-        }
+        let column = |i: usize| transfer(v, n, f64::from(s), self.dp[i].as_dvec3(), self.dv[i].as_dvec3()).as_vec3();
+        Self { dp: [column(0), column(1)], dv: self.dv }
     }
 
     /// Reflects at unit normal `n` whose own change over the footprint is `dn` (Pedersen 2011, eq. 28 corrected).
     pub fn reflect(&self, v: Vec3, n: Vec3, dn: [Vec3; 2]) -> Self {
         let (v, n) = (v.as_dvec3(), n.as_dvec3());
         let column = |i: usize| reflect(v, n, dn[i].as_dvec3(), self.dv[i].as_dvec3()).as_vec3();
-        Self {
-            dp: self.dp,
-            dv: [column(0), column(1)],
-        }
+        Self { dp: self.dp, dv: [column(0), column(1)] }
     }
 
     /// Refracts at unit normal `n`, which faces the incident side, with `eta` the ratio of the indices n₁/n₂
     /// (Pedersen 2011, eq. 35 corrected). Finite at the critical angle, where `1/√ε` is bounded.
     pub fn refract(&self, v: Vec3, n: Vec3, dn: [Vec3; 2], eta: f32) -> Self {
         let (v, n) = (v.as_dvec3(), n.as_dvec3());
-        let column = |i: usize| {
-            refract(v, n, dn[i].as_dvec3(), self.dv[i].as_dvec3(), f64::from(eta)).as_vec3()
-        };
-        Self {
-            dp: self.dp,
-            dv: [column(0), column(1)],
-        }
+        let column = |i: usize| refract(v, n, dn[i].as_dvec3(), self.dv[i].as_dvec3(), f64::from(eta)).as_vec3();
+        Self { dp: self.dp, dv: [column(0), column(1)] }
     }
 
     /// Shortens columns longer than `length` (metres) in `dp` and longer than `angle` in `dv`; a column that is not
@@ -218,8 +205,7 @@ mod tests {
         let (dq, refracted) = truth(Act::Refract(eta));
         let root = (1.0 - eta * eta * (1.0 - vn * vn)).sqrt();
         let bracket = eta * (1.0 + eta * vn / root);
-        let printed_35 = dv * eta - n * (bracket * n.dot(dv)) - dq * (eta * vn + root)
-            + n * (bracket * v.dot(dq));
+        let printed_35 = dv * eta - n * (bracket * n.dot(dv)) - dq * (eta * vn + root) + n * (bracket * v.dot(dq));
         assert!((printed_35 - refracted).length() > 5e-2);
     }
 
@@ -259,10 +245,7 @@ mod tests {
 
     #[test]
     fn bound_reports_what_it_changes() {
-        let mut d = Differential {
-            dp: [Vec3::X * 3.0, Vec3::Y],
-            dv: [Vec3::ZERO, Vec3::splat(f32::NAN)],
-        };
+        let mut d = Differential { dp: [Vec3::X * 3.0, Vec3::Y], dv: [Vec3::ZERO, Vec3::splat(f32::NAN)] };
         assert!(d.bound(2.0, 1.0));
         assert_eq!(d.dp, [Vec3::X * 2.0, Vec3::Y]);
         assert_eq!(d.dv[1], Vec3::ZERO);

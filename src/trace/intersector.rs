@@ -38,7 +38,15 @@ pub struct Intersector {
     /// Corners of each leaf entry, in the order in which rays meet them; for a sphere centre and radius.
     leaves: Vec<[Vec3; 3]>,
     triangle_count: u32,
+    /// Power of two by which coordinates are multiplied inside; see [`SCALED_RADIUS`].
+    scale: f32,
 }
+
+/// Radius to which a scene is scaled inside the intersector, up to a factor of two.
+///
+/// `obvhs` skips boxes that a ray leaves within 10⁻⁴ units of its start. In a scene of this size that is less than
+/// rounding, whatever unit the scene is in; and a power of two scales without rounding.
+const SCALED_RADIUS: f32 = (1u32 << 20) as f32;
 
 /// Boxes grow by this part of the scene's radius, so that no rounding in the box test loses a hit in the leaf test.
 const PADDING: f32 = 1e-6;
@@ -46,14 +54,14 @@ const PADDING: f32 = 1e-6;
 impl Intersector {
     /// Builds over all of `geometry`; `radius` is the scene's.
     pub fn new(geometry: &Geometry, radius: f32) -> Self {
+        let scale = libm::exp2f(libm::floorf(libm::log2f(SCALED_RADIUS / radius)));
+        let scale = if scale.is_normal() { scale } else { 1.0 };
         let count = geometry.primitive_count();
+        let padding = radius * scale * PADDING;
         let boxes: Vec<Aabb> = (0..count)
             .map(|i| {
                 let (low, high) = geometry.bounds(i);
-                Aabb::new(
-                    Vec3A::from(low) - radius * PADDING,
-                    Vec3A::from(high) + radius * PADDING,
-                )
+                Aabb::new(Vec3A::from(low * scale) - padding, Vec3A::from(high * scale) + padding)
             })
             .collect();
         let bvh = if count == 0 {
@@ -67,56 +75,41 @@ impl Intersector {
             .iter()
             .map(|&p| {
                 if p < triangle_count {
-                    geometry.corners(p as usize)
+                    geometry.corners(p as usize).map(|c| c * scale)
                 } else {
                     let s = geometry.spheres[(p - triangle_count) as usize];
-                    [s.center, Vec3::splat(s.radius), Vec3::ZERO]
+                    [s.center * scale, Vec3::splat(s.radius * scale), Vec3::ZERO]
                 }
             })
             .collect();
-        Self {
-            bvh,
-            primitives,
-            leaves,
-            triangle_count,
-        }
+        Self { bvh, primitives, leaves, triangle_count, scale }
     }
 
     /// The nearest surface along `ray`. None for a ray that is not finite.
     pub fn closest(&self, ray: &Ray) -> Option<Hit> {
+        let ray = &Ray { origin: ray.origin * self.scale, ..*ray };
         let traversal = self.start(ray, f32::INFINITY)?;
         let sheared = ShearedRay::new(ray.origin, ray.direction);
-        let mut best = Hit {
-            t: f32::INFINITY,
-            primitive: 0,
-            weights: [0.0; 2],
-        };
-        self.bvh
-            .ray_traverse(traversal, &mut RayHit::none(), |r, leaf| {
-                match self.leaf(ray, &sheared, leaf, r.tmax) {
-                    Some((t, b, c)) => {
-                        best = Hit {
-                            t,
-                            primitive: self.primitives[leaf],
-                            weights: [b, c],
-                        };
-                        t
-                    }
-                    None => f32::INFINITY,
-                }
-            });
-        best.t.is_finite().then_some(best)
+        let mut best = Hit { t: f32::INFINITY, primitive: 0, weights: [0.0; 2] };
+        self.bvh.ray_traverse(traversal, &mut RayHit::none(), |r, leaf| match self.leaf(ray, &sheared, leaf, r.tmax) {
+            Some((t, b, c)) => {
+                best = Hit { t, primitive: self.primitives[leaf], weights: [b, c] };
+                t
+            }
+            None => f32::INFINITY,
+        });
+        best.t.is_finite().then_some(Hit { t: best.t / self.scale, ..best })
     }
 
     /// Whether anything lies along `ray` before the distance `t_max`, metres.
     pub fn any(&self, ray: &Ray, t_max: f32) -> bool {
-        let Some(traversal) = self.start(ray, t_max) else {
+        let ray = &Ray { origin: ray.origin * self.scale, ..*ray };
+        let Some(traversal) = self.start(ray, t_max * self.scale) else {
             return false;
         };
         let sheared = ShearedRay::new(ray.origin, ray.direction);
         !self.bvh.ray_traverse_miss(traversal, |r, leaf| {
-            self.leaf(ray, &sheared, leaf, r.tmax)
-                .map_or(f32::INFINITY, |(t, ..)| t)
+            self.leaf(ray, &sheared, leaf, r.tmax).map_or(f32::INFINITY, |(t, ..)| t)
         })
     }
 
@@ -183,19 +176,14 @@ mod tests {
         };
         for i in 0..triangles {
             let base = g.positions.len() as u32;
-            g.positions
-                .extend((0..3).map(|c| p(i, 0) + 0.2 * p(i, 1 + c)));
+            g.positions.extend((0..3).map(|c| p(i, 0) + 0.2 * p(i, 1 + c)));
             g.triangles.push([base, base + 1, base + 2]);
             g.corner_normals.push([NONE; 3]);
             g.corner_uvs.push([NONE; 3]);
             g.triangle_materials.push(0);
         }
         for i in 0..spheres {
-            g.spheres.push(Sphere {
-                center: p(i, 9),
-                radius: 0.03,
-                material: 0,
-            });
+            g.spheres.push(Sphere { center: p(i, 9), radius: 0.03, material: 0 });
         }
         g
     }
@@ -235,10 +223,7 @@ mod tests {
     #[test]
     fn a_ray_that_is_not_finite_meets_nothing() {
         let intersector = Intersector::new(&soup(10, 0), 1.0);
-        let ray = Ray {
-            origin: Vec3::splat(f32::NAN),
-            direction: Vec3::X,
-        };
+        let ray = Ray { origin: Vec3::splat(f32::NAN), direction: Vec3::X };
         assert!(intersector.closest(&ray).is_none());
     }
 }

@@ -31,11 +31,9 @@ pub struct SpecularRay {
 pub fn specular_weights(material: &Material, surface: &Surface, v: Vec3) -> Option<SpecularWeights> {
     let cos = -v.dot(shading_towards(surface, v));
     match *material {
-        Material::Mirror { reflectance } => Some(SpecularWeights {
-            reflected: reflectance,
-            refracted: Rgb::ZERO,
-            eta: 1.0,
-        }),
+        Material::Mirror { reflectance } => {
+            Some(SpecularWeights { reflected: reflectance, refracted: Rgb::ZERO, eta: 1.0 })
+        }
         Material::Metal { reflectance } => {
             let rest = (1.0 - cos).clamp(0.0, 1.0);
             let fresnel = rest * rest * rest * rest * rest;
@@ -48,11 +46,7 @@ pub fn specular_weights(material: &Material, surface: &Surface, v: Vec3) -> Opti
         Material::Dielectric { ior, .. } => {
             let eta = if surface.front { 1.0 / ior } else { ior };
             let reflected = fresnel(cos, eta);
-            Some(SpecularWeights {
-                reflected: Rgb::splat(reflected),
-                refracted: Rgb::splat(1.0 - reflected),
-                eta,
-            })
+            Some(SpecularWeights { reflected: Rgb::splat(reflected), refracted: Rgb::splat(1.0 - reflected), eta })
         }
         _ => None,
     }
@@ -80,11 +74,7 @@ pub fn reflected(scene: &Scene, surface: &Surface, v: Vec3, d: &Differential) ->
     let direction = (v - n * (2.0 * v.dot(n))).normalize();
     if direction.dot(surface.normal) > 0.0 {
         let dn = smooth_differential(scene, surface, n, d);
-        return SpecularRay {
-            direction,
-            differential: d.reflect(v, n, dn),
-            beyond_horizon: n != surface.shading,
-        };
+        return SpecularRay { direction, differential: d.reflect(v, n, dn), beyond_horizon: n != surface.shading };
     }
     let n = surface.normal;
     SpecularRay {
@@ -105,35 +95,19 @@ pub fn refracted(scene: &Scene, surface: &Surface, v: Vec3, d: &Differential, et
     let direction = bend(n);
     if direction.dot(surface.normal) < 0.0 {
         let dn = smooth_differential(scene, surface, n, d);
-        return SpecularRay {
-            direction,
-            differential: d.refract(v, n, dn, eta),
-            beyond_horizon: n != surface.shading,
-        };
+        return SpecularRay { direction, differential: d.refract(v, n, dn, eta), beyond_horizon: n != surface.shading };
     }
     let n = surface.normal;
-    SpecularRay {
-        direction: bend(n),
-        differential: d.refract(v, n, [Vec3::ZERO; 2], eta),
-        beyond_horizon: true,
-    }
+    SpecularRay { direction: bend(n), differential: d.refract(v, n, [Vec3::ZERO; 2], eta), beyond_horizon: true }
 }
 
 /// The shading normal, or the flat one where the shading normal faces away from the ray.
 fn shading_towards(surface: &Surface, v: Vec3) -> Vec3 {
-    if surface.shading.dot(v) < 0.0 {
-        surface.shading
-    } else {
-        surface.normal
-    }
+    if surface.shading.dot(v) < 0.0 { surface.shading } else { surface.normal }
 }
 
 fn smooth_differential(scene: &Scene, surface: &Surface, n: Vec3, d: &Differential) -> [Vec3; 2] {
-    if n == surface.shading {
-        surface.normal_differential(scene, d.dp)
-    } else {
-        [Vec3::ZERO; 2]
-    }
+    if n == surface.shading { surface.normal_differential(scene, d.dp) } else { [Vec3::ZERO; 2] }
 }
 
 #[cfg(test)]

@@ -26,11 +26,7 @@ impl ShearedRay {
         if d[kz] < 0.0 {
             std::mem::swap(&mut kx, &mut ky);
         }
-        Self {
-            origin: origin.to_array(),
-            axes: [kx, ky, kz],
-            shear: [d[kx] / d[kz], d[ky] / d[kz], 1.0 / d[kz]],
-        }
+        Self { origin: origin.to_array(), axes: [kx, ky, kz], shear: [d[kx] / d[kz], d[ky] / d[kz], 1.0 / d[kz]] }
     }
 
     /// Distance along the ray and the weights of the second and third corner, if the triangle is met from either
@@ -53,9 +49,8 @@ impl ShearedRay {
         let mut w = x[1] * y[0] - y[1] * x[0];
         if u == 0.0 || v == 0.0 || w == 0.0 {
             // A product may have rounded to the other's value: products of f32 are exact in f64.
-            let edge = |a: usize, b: usize| {
-                (f64::from(x[a]) * f64::from(y[b]) - f64::from(y[a]) * f64::from(x[b])) as f32
-            };
+            let edge =
+                |a: usize, b: usize| (f64::from(x[a]) * f64::from(y[b]) - f64::from(y[a]) * f64::from(x[b])) as f32;
             u = edge(2, 1);
             v = edge(0, 2);
             w = edge(1, 0);
@@ -107,9 +102,7 @@ mod tests {
     #[test]
     fn no_ray_leaks_through_edges_or_vertices() {
         let v = [Vec3::X, Vec3::Y, Vec3::Z, -Vec3::X, -Vec3::Y, -Vec3::Z].map(|v| v * 0.7 + 0.03);
-        let faces = [
-            [0, 1, 2], [1, 3, 2], [3, 4, 2], [4, 0, 2], [1, 0, 5], [3, 1, 5], [4, 3, 5], [0, 4, 5],
-        ];
+        let faces = [[0, 1, 2], [1, 3, 2], [3, 4, 2], [4, 0, 2], [1, 0, 5], [3, 1, 5], [4, 3, 5], [0, 4, 5]];
         let sequence = Sequence::new(Sampling::Random, 2);
         for i in 0..200_000u64 {
             let x = sequence.four(i, 0);
@@ -122,9 +115,7 @@ mod tests {
             };
             let target = v[f[0]].lerp(v[f[1]], along);
             let ray = ShearedRay::new(o, (target - o).normalize());
-            let met = faces
-                .iter()
-                .any(|f| ray.intersect(&f.map(|k| v[k]), f32::INFINITY).is_some());
+            let met = faces.iter().any(|f| ray.intersect(&f.map(|k| v[k]), f32::INFINITY).is_some());
             assert!(met, "leak towards {target}");
         }
     }

@@ -1,0 +1,128 @@
+//! All surfaces and lights in f64 as they come from a file, and their move to the local origin.
+
+use crate::math::rgb::Rgb;
+use crate::scene::Material;
+use crate::scene::geometry::{Geometry, NONE, Sphere};
+use crate::scene::shapes::Mesh;
+use glam::DVec3;
+
+/// The camera before it is moved to the local origin.
+pub(super) struct CameraSource {
+    pub(super) position: DVec3,
+    pub(super) target: DVec3,
+    pub(super) up: DVec3,
+    pub(super) fov_y: f64,
+    pub(super) resolution: [u32; 2],
+}
+
+/// Lights before they are moved to the local origin.
+pub(super) enum LightSource {
+    Point {
+        position: DVec3,
+        power: Rgb,
+    },
+    Sphere {
+        center: DVec3,
+        radius: f64,
+        power: Rgb,
+    },
+    Quad {
+        center: DVec3,
+        u: DVec3,
+        v: DVec3,
+        power: Rgb,
+    },
+    Spot {
+        position: DVec3,
+        direction: DVec3,
+        half: f64,
+        falloff: f64,
+        power: Rgb,
+    },
+    Directional {
+        direction: DVec3,
+        irradiance: Rgb,
+    },
+    /// A range of triangles.
+    Mesh {
+        first: usize,
+        count: usize,
+        radiance: Rgb,
+    },
+}
+
+/// All surfaces in f64, as they come.
+#[derive(Default)]
+pub(super) struct Assembly {
+    pub(super) mesh: Mesh,
+    pub(super) materials: Vec<Material>,
+    pub(super) spheres: Vec<(DVec3, f64, u32)>,
+    pub(super) lights: Vec<LightSource>,
+}
+
+impl Assembly {
+    pub(super) fn add_mesh(&mut self, mesh: Mesh, material: impl Fn(u32) -> u32) {
+        let (p, n, t) = (self.mesh.positions.len() as u32, self.mesh.normals.len() as u32, self.mesh.uvs.len() as u32);
+        let shift = |i: [u32; 3], by: u32| i.map(|i| if i == NONE { NONE } else { i + by });
+        self.mesh.positions.extend(mesh.positions);
+        self.mesh.normals.extend(mesh.normals);
+        self.mesh.uvs.extend(mesh.uvs);
+        self.mesh.triangles.extend(mesh.triangles.iter().map(|&i| shift(i, p)));
+        self.mesh.corner_normals.extend(mesh.corner_normals.iter().map(|&i| shift(i, n)));
+        self.mesh.corner_uvs.extend(mesh.corner_uvs.iter().map(|&i| shift(i, t)));
+        self.mesh.materials.extend(mesh.materials.iter().map(|&m| material(m)));
+    }
+
+    pub(super) fn add_material(&mut self, material: Material) -> u32 {
+        self.materials.push(material);
+        self.materials.len() as u32 - 1
+    }
+
+    /// Centre and radius of what is there; a unit sphere about the origin if nothing is.
+    pub(super) fn bounds(&self) -> (DVec3, f64) {
+        let mut low = DVec3::INFINITY;
+        let mut high = DVec3::NEG_INFINITY;
+        for t in &self.mesh.triangles {
+            for &i in t {
+                low = low.min(self.mesh.positions[i as usize]);
+                high = high.max(self.mesh.positions[i as usize]);
+            }
+        }
+        for (c, r, _) in &self.spheres {
+            low = low.min(*c - *r);
+            high = high.max(*c + *r);
+        }
+        let radius = (high - low).length() / 2.0;
+        if radius.is_finite() && radius > 0.0 { ((low + high) / 2.0, radius) } else { (DVec3::ZERO, 1.0) }
+    }
+}
+
+/// Moves the assembly to the local origin, in f32, without its zero-area triangles.
+pub(super) fn local_geometry(assembly: &Assembly, origin: DVec3, radius: f64) -> Geometry {
+    let mesh = &assembly.mesh;
+    let mut g = Geometry {
+        positions: mesh.positions.iter().map(|&p| (p - origin).as_vec3()).collect(),
+        normals: mesh.normals.iter().map(|n| n.try_normalize().unwrap_or(DVec3::Y).as_vec3()).collect(),
+        uvs: mesh.uvs.iter().map(|t| t.as_vec2()).collect(),
+        spheres: assembly
+            .spheres
+            .iter()
+            .map(|&(c, r, material)| Sphere { center: (c - origin).as_vec3(), radius: r as f32, material })
+            .collect(),
+        ..Default::default()
+    };
+    // Products of edges shorter than this vanish against the scene in f32.
+    let smallest = radius * radius * 1e-24;
+    for (i, t) in mesh.triangles.iter().enumerate() {
+        let [a, b, c] = t.map(|i| mesh.positions[i as usize]);
+        if (b - a).cross(c - a).length() <= smallest {
+            g.zero_area += 1;
+            continue;
+        }
+        g.triangles.push(*t);
+        g.corner_normals.push(mesh.corner_normals[i]);
+        g.corner_uvs.push(mesh.corner_uvs[i]);
+        g.triangle_materials.push(mesh.materials[i]);
+    }
+    g
+}

@@ -1,0 +1,83 @@
+//! Materials of a scene file.
+
+use super::{Checked, Loader};
+use crate::math::rgb::Rgb;
+use crate::scene::Material;
+use crate::scene::scene_file::MaterialFile;
+use crate::scene::texture::Texture;
+use glam::DVec3;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+impl Loader<'_> {
+    pub(super) fn materials(&mut self, materials: &BTreeMap<String, MaterialFile>) -> Checked<()> {
+        for (name, file) in materials {
+            let material = self.material(&format!("materials.{name}"), file)?;
+            let index = self.assembly.add_material(material);
+            self.material_index.insert(name.clone(), index);
+        }
+        Ok(())
+    }
+
+    pub(super) fn material(&self, key: &str, file: &MaterialFile) -> Checked<Material> {
+        let at = |k: &str| format!("{key}.{k}");
+        let allowed: &[&str] = match file.kind.as_str() {
+            "diffuse" => &["reflectance", "texture"],
+            "mirror" | "metal" => &["reflectance"],
+            "dielectric" => &["ior", "transmittance"],
+            "emissive" => &["radiance"],
+            other => {
+                return self.wrong(
+                    at("kind"),
+                    format!("unknown kind `{other}`; use diffuse, mirror, metal, dielectric or emissive"),
+                );
+            }
+        };
+        self.only(
+            key,
+            &file.kind,
+            allowed,
+            &[
+                ("reflectance", file.reflectance.is_some()),
+                ("texture", file.texture.is_some()),
+                ("ior", file.ior.is_some()),
+                ("transmittance", file.transmittance.is_some()),
+                ("radiance", file.radiance.is_some()),
+            ],
+        )?;
+        let unit = |k: &str, value: Option<[f64; 3]>, default: f64| -> Checked<Rgb> {
+            let c = value.unwrap_or([default; 3]);
+            if c.iter().all(|x| (0.0..=1.0).contains(x)) {
+                Ok(DVec3::from_array(c).as_vec3())
+            } else {
+                self.wrong(at(k), format!("each channel must lie in [0, 1], got {c:?}"))
+            }
+        };
+        Ok(match file.kind.as_str() {
+            "diffuse" => Material::Diffuse {
+                reflectance: unit("reflectance", file.reflectance, 0.8)?,
+                texture: match &file.texture {
+                    Some(name) => Some(Arc::new(self.texture(&at("texture"), name)?)),
+                    None => None,
+                },
+            },
+            "mirror" => Material::Mirror { reflectance: unit("reflectance", file.reflectance, 1.0)? },
+            "metal" => Material::Metal { reflectance: unit("reflectance", file.reflectance, 0.9)? },
+            "dielectric" => {
+                let ior = file.ior.unwrap_or(1.5);
+                if !(1.0..=10.0).contains(&ior) {
+                    return self.wrong(at("ior"), format!("must lie in [1, 10], got {ior}"));
+                }
+                Material::Dielectric { ior: ior as f32, transmittance: unit("transmittance", file.transmittance, 1.0)? }
+            }
+            _ => Material::Emitter { radiance: self.power(&at("radiance"), file.radiance, "W/(m² sr)")? },
+        })
+    }
+
+    pub(super) fn texture(&self, key: &str, name: &str) -> Checked<Texture> {
+        let Some(path) = self.files.path(name) else {
+            return self.wrong(key, "a built-in scene has no textures");
+        };
+        Texture::load(&path).or_else(|why| self.wrong(key, format!("{}: {why}; give a PNG", path.display())))
+    }
+}

@@ -1,0 +1,216 @@
+//! Shapes of a scene file: from their keys to placed meshes and spheres.
+
+use super::assembly::LightSource;
+use super::{Checked, Loader, MAX_LENGTH};
+use crate::math::rgb::Rgb;
+use crate::scene::geometry::NONE;
+use crate::scene::obj::{self, CREASE_ANGLE};
+use crate::scene::scene_file::{RotateFile, ShapeFile};
+use crate::scene::shapes::{self, Placement};
+use crate::scene::{Material, SceneError};
+use glam::{DMat3, DVec3};
+
+impl Loader<'_> {
+    pub(super) fn placement(&self, key: &str, shape: &ShapeFile) -> Checked<Placement> {
+        let scale = match shape.scale {
+            Some(s) => self.positive(&format!("{key}.scale"), s, "a factor")?,
+            None => 1.0,
+        };
+        let rotation = match &shape.rotate {
+            Some(RotateFile { axis, angle }) => {
+                let axis = self.direction(&format!("{key}.rotate.axis"), *axis)?;
+                if !angle.is_finite() {
+                    return self.wrong(format!("{key}.rotate.angle"), "must be finite, in degrees");
+                }
+                shapes::rotation(axis, *angle)
+            }
+            None => DMat3::IDENTITY,
+        };
+        let translation = match shape.translate {
+            Some(t) => self.vector(&format!("{key}.translate"), t)?,
+            None => DVec3::ZERO,
+        };
+        Ok(Placement { scale, rotation, translation })
+    }
+
+    pub(super) fn shape(&mut self, key: &str, s: &ShapeFile) -> Checked<()> {
+        let at = |k: &str| format!("{key}.{k}");
+        let allowed: &[&str] = match s.kind.as_str() {
+            "mesh" => &["file", "crease_angle"],
+            "quad" => &["center", "u", "v"],
+            "box" => &["half_size"],
+            "sphere" => &["center", "radius"],
+            "ring" => &["inner", "outer", "height", "segments"],
+            other => {
+                return self.wrong(at("kind"), format!("unknown kind `{other}`; use mesh, quad, box, sphere or ring"));
+            }
+        };
+        self.only(
+            key,
+            &s.kind,
+            allowed,
+            &[
+                ("file", s.file.is_some()),
+                ("crease_angle", s.crease_angle.is_some()),
+                ("center", s.center.is_some()),
+                ("u", s.u.is_some()),
+                ("v", s.v.is_some()),
+                ("half_size", s.half_size.is_some()),
+                ("radius", s.radius.is_some()),
+                ("inner", s.inner.is_some()),
+                ("outer", s.outer.is_some()),
+                ("height", s.height.is_some()),
+                ("segments", s.segments.is_some()),
+            ],
+        )?;
+        self.animation(key, s.animate.as_ref())?;
+        let place = self.placement(key, s)?;
+        let material = match &s.material {
+            Some(name) => match self.material_index.get(name) {
+                Some(m) => Some(*m),
+                None => {
+                    let known: Vec<_> = self.material_index.keys().cloned().collect();
+                    return self.wrong(at("material"), format!("no material `{name}`; there are {}", known.join(", ")));
+                }
+            },
+            None if s.kind == "mesh" => None,
+            None => return self.wrong(at("material"), "is missing; name a material"),
+        };
+        let first = self.assembly.mesh.triangles.len();
+        let center = match s.center {
+            Some(c) => self.vector(&at("center"), c)?,
+            None => DVec3::ZERO,
+        };
+        let mut emitted = None;
+        let mesh = match s.kind.as_str() {
+            "sphere" => {
+                let radius = self.required(key, "radius", s.radius)?;
+                let radius = self.positive(&at("radius"), radius, "metres")? * place.scale;
+                let center = place.point(center);
+                // A sphere's material was found above; only a mesh may go without.
+                let material = material.unwrap_or(NONE);
+                self.assembly.spheres.push((center, radius, material));
+                if let Some(radiance) = self.emission(material) {
+                    let flux = radiance.as_dvec3() * (4.0 * std::f64::consts::PI.powi(2) * radius * radius);
+                    self.assembly.lights.push(LightSource::Sphere { center, radius, power: flux.as_vec3() });
+                }
+                return Ok(());
+            }
+            "quad" => {
+                let u = self.required(key, "u", s.u)?;
+                let v = self.required(key, "v", s.v)?;
+                let (u, v) = (self.vector(&at("u"), u)?, self.vector(&at("v"), v)?);
+                if let Some(radiance) = material.and_then(|m| self.emission(m)) {
+                    let (u, v) = (place.vector(u), place.vector(v));
+                    let area = 4.0 * u.cross(v).length();
+                    emitted = Some(LightSource::Quad {
+                        center: place.point(center),
+                        u,
+                        v,
+                        power: (radiance.as_dvec3() * (std::f64::consts::PI * area)).as_vec3(),
+                    });
+                }
+                shapes::quad(center, u, v)
+            }
+            "box" => {
+                let half = self.required(key, "half_size", s.half_size)?;
+                for h in half {
+                    self.positive(&at("half_size"), h, "metres")?;
+                }
+                shapes::cuboid(DVec3::from_array(half))
+            }
+            "ring" => {
+                let inner = self.required(key, "inner", s.inner)?;
+                let outer = self.required(key, "outer", s.outer)?;
+                let height = self.required(key, "height", s.height)?;
+                let inner = self.positive(&at("inner"), inner, "metres")?;
+                let height = self.positive(&at("height"), height, "metres")?;
+                if !(outer > inner && outer <= MAX_LENGTH) {
+                    return self.wrong(at("outer"), format!("must exceed `inner` ({inner}), got {outer}"));
+                }
+                let segments = s.segments.unwrap_or(256);
+                if !(3..=1_000_000).contains(&segments) {
+                    return self.wrong(at("segments"), format!("must lie in 3 to 1000000, got {segments}"));
+                }
+                shapes::ring(inner, outer, height, segments as u32)
+            }
+            _ => return self.mesh(key, s, &place, material),
+        };
+        // Only a mesh may lack a material, and it has been dealt with.
+        let material = material.unwrap_or(NONE);
+        self.assembly.add_mesh(mesh.placed(&place), |_| material);
+        match emitted {
+            Some(light) => self.assembly.lights.push(light),
+            None => self.emit_from(first, material),
+        }
+        Ok(())
+    }
+
+    pub(super) fn mesh(&mut self, key: &str, s: &ShapeFile, place: &Placement, material: Option<u32>) -> Checked<()> {
+        let Some(name) = &s.file else {
+            return self.wrong(format!("{key}.file"), "is missing; name an OBJ file");
+        };
+        let crease = s.crease_angle.unwrap_or(CREASE_ANGLE);
+        if !(0.0..=180.0).contains(&crease) {
+            return self.wrong(format!("{key}.crease_angle"), format!("must lie in [0, 180] degrees, got {crease}"));
+        }
+        let (path, text) = match self.files.read(name) {
+            Ok(found) => found,
+            Err(SceneError::Unreadable { file, why }) if !key.eq("mesh") => {
+                return self.wrong(format!("{key}.file"), format!("{}: {why}", file.display()));
+            }
+            Err(e) => return Err(e),
+        };
+        let obj = obj::read(&path, &text, crease).map_err(|e| match e.line {
+            0 => SceneError::Whole { file: path.clone(), what: e.what },
+            line => SceneError::At { file: path.clone(), line, key: "OBJ".into(), what: e.what },
+        })?;
+        self.warnings.extend(obj.warnings);
+        self.texts.push(text);
+        self.texts.push(obj.material_text);
+        let first = self.assembly.mesh.triangles.len();
+        let mesh = obj.mesh.placed(place);
+        if let Some(material) = material {
+            self.assembly.add_mesh(mesh, |_| material);
+            self.emit_from(first, material);
+            return Ok(());
+        }
+        let mut own = Vec::new();
+        for (name, file) in &obj.materials {
+            let made = self.material(&format!("materials.{name} of {}", path.display()), file)?;
+            own.push(self.assembly.add_material(made));
+        }
+        let mut fallback = NONE;
+        if mesh.materials.contains(&NONE) {
+            self.warnings.push(format!("{}: surfaces without a material are grey", path.display()));
+            fallback = self.assembly.add_material(Material::Diffuse { reflectance: Rgb::splat(0.8), texture: None });
+        }
+        self.assembly.add_mesh(mesh, |m| own.get(m as usize).copied().unwrap_or(fallback));
+        // Each emissive material of the mesh is a light of its triangles; they come in runs.
+        let mut start = first;
+        while start < self.assembly.mesh.materials.len() {
+            let material = self.assembly.mesh.materials[start];
+            let run = self.assembly.mesh.materials[start..].iter().take_while(|&&m| m == material).count();
+            if let Some(radiance) = self.emission(material) {
+                self.assembly.lights.push(LightSource::Mesh { first: start, count: run, radiance });
+            }
+            start += run;
+        }
+        Ok(())
+    }
+
+    pub(super) fn emission(&self, material: u32) -> Option<Rgb> {
+        match self.assembly.materials.get(material as usize) {
+            Some(Material::Emitter { radiance }) => Some(*radiance),
+            _ => None,
+        }
+    }
+
+    /// Makes all triangles from `first` on a light, if their material emits.
+    pub(super) fn emit_from(&mut self, first: usize, material: u32) {
+        if let Some(radiance) = self.emission(material) {
+            let count = self.assembly.mesh.triangles.len() - first;
+            self.assembly.lights.push(LightSource::Mesh { first, count, radiance });
+        }
+    }
+}
