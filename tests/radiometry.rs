@@ -72,9 +72,9 @@ fn each_other_light_has_its_closed_form() {
 
     // Light from an area needs four dimensions of numbers, and so more photons and larger blocks for the same noise.
     let sphere = Light::Sphere { center: position, radius: 0.2, power: POWER };
-    let (image, camera) = by_photons(vec![sphere], "integrated", 2_000_000, 12);
+    let (image, camera) = by_photons(vec![sphere], "integrated", 1_000_000, 8);
     let lambertian = |p: Vec3| 50.0 * towards(p).y / (4.0 * PI * towards(p).length().powi(3));
-    check_blocks(&image, &camera, lambertian, 64, "sphere");
+    check_blocks(&image, &camera, lambertian, 128, "sphere");
 
     let direction = Vec3::NEG_Y;
     let spot = Light::Spot { position, direction, cos_half: 0.2, falloff: 0.0, power: POWER };
@@ -104,7 +104,7 @@ fn each_other_light_has_its_closed_form() {
     let (h, e) = (1.5f32, 0.3f32);
     let center = Vec3::new(0.0, h, 0.0);
     let quad = Light::Quad { center, u: Vec3::X * e, v: Vec3::Z * e, power: POWER };
-    let (image, camera) = by_photons(vec![quad], "integrated", 2_000_000, 12);
+    let (image, camera) = by_photons(vec![quad], "integrated", 1_000_000, 8);
     let corner = |x: f32, z: f32| {
         let (a, b) = (x / h, z / h);
         let (ra, rb) = ((1.0 + a * a).sqrt(), (1.0 + b * b).sqrt());
@@ -114,7 +114,7 @@ fn each_other_light_has_its_closed_form() {
         let (x0, x1, z0, z1) = (-e - p.x, e - p.x, -e - p.z, e - p.z);
         corner(x1, z1) - corner(x0, z1) - corner(x1, z0) + corner(x0, z0)
     };
-    check_blocks(&image, &camera, |p| 50.0 / (4.0 * e * e) * factor(p), 64, "quad");
+    check_blocks(&image, &camera, |p| 50.0 / (4.0 * e * e) * factor(p), 128, "quad");
 }
 
 /// Several lights at once, one of them far dimmer, share photons without a bias.

@@ -73,7 +73,7 @@ fn glass_ball() {
         ([104, 123, 120, 130], grey(2.05469)),
         ([70, 110, 95, 140], grey(0.00882)),
     ];
-    agrees("glass_ball", 40, 400_000, &regions, 0.03);
+    agrees("glass_ball", 40, 2_500_000, &regions, 0.03);
 }
 
 #[test]

@@ -182,7 +182,8 @@ fn pictures_do_not_depend_on_unit_or_place() {
 #[test]
 fn progressive_passes_converge() {
     let scene = open("ring").expect("built in");
-    let settings = RenderSettings::new(&scene, &few(100_000), Some([128, 128]), 1).expect("valid");
+    let flags = RenderFile { footprint_scale: Some(1.5), ..few(200_000) };
+    let settings = RenderSettings::new(&scene, &flags, Some([128, 128]), 1).expect("valid");
     let mut renderer = Renderer::new(scene, settings, vec![estimator("integrated").expect("registered")]);
     let reference = cusp::measure::Reference::built_in("ring").expect("decodes").expect("stored");
     let small = reference.image.resampled([128, 128]);
@@ -195,6 +196,6 @@ fn progressive_passes_converge() {
         }
     }
     println!("{errors:?}");
-    // t^(-2/3) over five doublings would be a tenth.
-    assert!(errors[5] < errors[0] * 0.1, "{errors:?}");
+    // t^(-2/3) over four doublings from the second pass, when rays are first jittered, is a factor of 6.3.
+    assert!(errors[5] < errors[1] / 5.0, "{errors:?}");
 }

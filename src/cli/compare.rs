@@ -161,12 +161,13 @@ impl<'a> Comparison<'a> {
         Ok(())
     }
 
-    /// Where the estimators that use footprints disagree most; where the image changes most if there is but one.
+    /// Where the estimators that use footprints and the same view rays disagree most; where the image changes most if
+    /// there is but one.
     fn default_crop(&self, images: &[Image]) -> Rect {
         let by_footprint: Vec<&Image> = images
             .iter()
             .zip(self.renderer.estimators())
-            .filter(|(_, e)| e.lookup() != Lookup::Disc)
+            .filter(|(_, e)| e.lookup() != Lookup::Disc && e.rays_per_axis() == 1)
             .map(|(i, _)| i)
             .collect();
         match by_footprint.as_slice() {
