@@ -1,5 +1,7 @@
 //! Photon footprints against finite differences of rays traced through real scenes.
 
+#![allow(clippy::expect_used, missing_docs, reason = "a failed expectation is how this program reports")]
+
 use cusp::math::frame::tangents;
 use cusp::scene::{Material, Scene, open};
 use cusp::trace::scatter::{reflected, refracted, specular_weights};

@@ -1,5 +1,7 @@
 //! Absolute radiometry and energy: stored photons against closed forms.
 
+#![allow(clippy::expect_used, missing_docs, reason = "a failed expectation is how this program reports")]
+
 use cusp::estimate::registry::estimator;
 use cusp::math::rgb::Rgb;
 use cusp::render::film::Image;

@@ -1,5 +1,7 @@
 //! Progressive renders against images by an independent renderer.
 
+#![allow(clippy::expect_used, missing_docs, reason = "a failed expectation is how this program reports")]
+
 use cusp::estimate::registry::estimator;
 use cusp::measure::Reference;
 use cusp::measure::metrics::{block_average, compare, region_mean};

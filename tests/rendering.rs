@@ -1,5 +1,7 @@
 //! What a render promises: the same bits, the same image with parts forced on, defined images of odd scenes.
 
+#![allow(clippy::expect_used, missing_docs, reason = "a failed expectation is how this program reports")]
+
 use cusp::estimate::registry::{estimator, estimators};
 use cusp::measure::metrics::{Mask, compare};
 use cusp::render::film::Image;

@@ -1,0 +1,154 @@
+//! The hot paths, each beside a baseline that is measured in the same run.
+
+#![allow(clippy::expect_used, missing_docs, reason = "a failed expectation is how this program reports")]
+
+use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
+use cusp::estimate::polygon::mean_over_parallelogram;
+use cusp::estimate::registry::estimator;
+use cusp::estimate::{Estimator, Gathered, View};
+use cusp::math::sequence::{Sampling, Sequence};
+use cusp::photons::kd_tree::Nearest;
+use cusp::photons::map::{FootprintLimits, MapParts, Query};
+use cusp::photons::{Photon, PhotonMap};
+use cusp::render::renderer::Watch;
+use cusp::render::{RenderSettings, Renderer};
+use cusp::scene::open;
+use cusp::scene::scene_file::RenderFile;
+use cusp::trace::Ray;
+use glam::Vec3;
+use std::hint::black_box;
+
+/// The caustic photons of the ring and a grid of view hits inside it.
+fn ring() -> (Vec<Photon>, Vec<View>) {
+    let scene = open("ring").expect("built in");
+    let flags = RenderFile { photons: Some(450_000), ..Default::default() };
+    let settings = RenderSettings::new(&scene, &flags, Some([64, 64]), 1).expect("valid");
+    let mut renderer = Renderer::new(scene, settings, vec![estimator("integrated").expect("registered")]);
+    renderer.step(&Watch::SILENT);
+    let photons = renderer.last_pass().expect("one pass").0.stored.caustic.clone();
+    let views = (0..64)
+        .flat_map(|i| (0..64).map(move |j| (i as f32 / 32.0 - 1.0, j as f32 / 32.0 - 1.0)))
+        .map(|(x, z)| View {
+            query: Query { center: Vec3::new(x, -0.25, z), normal: Vec3::Y, axes: [Vec3::X * 0.004, Vec3::Z * 0.006] },
+            direction: Vec3::new(0.1, -0.7, -0.7).normalize(),
+        })
+        .collect();
+    (photons, views)
+}
+
+fn gather_and_estimate(c: &mut Criterion) {
+    let (photons, views) = ring();
+    let limits = FootprintLimits { scale: 3.0, floor: 1e-6, ceiling: 10.0 };
+    let map = PhotonMap::new(&photons, limits, MapParts { kd_tree: true, overlap: true });
+    let mut heap = Nearest::new();
+    let mut found = Vec::new();
+    let mut group = c.benchmark_group("gather_4096_hits");
+    group.bench_function("brute_force_point (baseline)", |b| {
+        b.iter(|| {
+            found.clear();
+            for v in views.iter().step_by(64) {
+                for (i, p) in map.photons().iter().enumerate() {
+                    if p.to_filter(v.query.center - p.position).length_squared() < 1.0 && p.lights(v.query.normal) {
+                        found.push(i as u32);
+                    }
+                }
+            }
+            found.len()
+        });
+    });
+    group.bench_function("overlap_point", |b| {
+        b.iter(|| {
+            found.clear();
+            views.iter().for_each(|v| map.overlapping_point(&v.query, &mut found));
+            found.len()
+        });
+    });
+    group.bench_function("overlap_parallelogram", |b| {
+        b.iter(|| {
+            found.clear();
+            views.iter().for_each(|v| map.overlapping_parallelogram(&v.query, &mut found));
+            found.len()
+        });
+    });
+    group.bench_function("knn_50", |b| {
+        b.iter(|| {
+            found.clear();
+            views.iter().for_each(|v| map.nearest(&v.query, 50, &mut heap, &mut found));
+            found.len()
+        });
+    });
+    group.finish();
+
+    let lists: Vec<Vec<u32>> = views
+        .iter()
+        .map(|v| {
+            let mut list = Vec::new();
+            map.nearest(&v.query, 50, &mut heap, &mut list);
+            list
+        })
+        .collect();
+    let mut group = c.benchmark_group("estimate_4096_hits_knn_50");
+    for name in ["regular", "coplanar", "multi_sampled:n=8", "multi_sampled:n=16", "integrated"] {
+        let e: Box<dyn Estimator> = estimator(name).expect("registered");
+        group.bench_function(BenchmarkId::from_parameter(name), |b| {
+            b.iter(|| {
+                let mut sum = Vec3::ZERO;
+                for (v, indices) in views.iter().zip(&lists) {
+                    sum += e.irradiance(&Gathered { photons: map.photons(), indices, radius: 0.0 }, v);
+                }
+                sum
+            });
+        });
+    }
+    group.finish();
+}
+
+fn polygon(c: &mut Criterion) {
+    let sequence = Sequence::new(Sampling::Random, 1);
+    let cases: Vec<[Vec3; 3]> = (0..1000)
+        .map(|i| {
+            let v = |s| Vec3::from_slice(&sequence.four(i, s)[..3]) * 2.0 - 1.0;
+            [v(0) * 1.5, v(1), v(2)]
+        })
+        .collect();
+    let mut group = c.benchmark_group("mean_over_1000_parallelograms");
+    group.bench_function("closed_form", |b| {
+        b.iter(|| cases.iter().map(|[c, u, v]| mean_over_parallelogram(*c, *u, *v)).sum::<f64>());
+    });
+    let eight = cusp::estimate::multi_sampled::MultiSampled::new(8, cusp::estimate::multi_sampled::Grid::Cells);
+    group.bench_function("8x8_points (baseline)", |b| {
+        b.iter(|| cases.iter().map(|[c, u, v]| eight.mean(*c, *u, *v)).sum::<f32>());
+    });
+    group.finish();
+}
+
+fn tracing(c: &mut Criterion) {
+    let mut group = c.benchmark_group("trace");
+    group.sample_size(20);
+    for name in ["ring", "cornell", "glass_sphere"] {
+        let scene = open(name).expect("built in");
+        let flags = RenderFile { photons: Some(100_000), ..Default::default() };
+        let settings = RenderSettings::new(&scene, &flags, Some([128, 128]), 1).expect("valid");
+        let renderer = Renderer::new(scene, settings, vec![estimator("integrated").expect("registered")]);
+        let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a pool");
+        group.bench_function(BenchmarkId::new("100000_photons_one_thread", name), |b| {
+            b.iter(|| one.install(|| renderer.emitter(renderer.plan()).run(0, &|| false).emitted));
+        });
+        let scene = renderer.scene();
+        let sequence = Sequence::new(Sampling::Random, 2);
+        let rays: Vec<Ray> = (0..10_000)
+            .map(|i| {
+                let x = sequence.four(i, 0);
+                let direction = cusp::math::frame::uniform_sphere(x[0], x[1]).normalize();
+                Ray { origin: Vec3::Y * (0.2 * scene.radius), direction }
+            })
+            .collect();
+        group.bench_function(BenchmarkId::new("10000_closest_hits", name), |b| {
+            b.iter(|| rays.iter().filter(|r| renderer.intersector().closest(black_box(r)).is_some()).count());
+        });
+    }
+    group.finish();
+}
+
+criterion_group!(benches, gather_and_estimate, polygon, tracing);
+criterion_main!(benches);

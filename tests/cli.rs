@@ -1,0 +1,275 @@
+//! The command line as a user meets it: outputs, exit codes, and one clear line for everything that is wrong.
+
+#![allow(clippy::expect_used, missing_docs, reason = "a failed expectation is how this program reports")]
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+fn cusp(args: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_cusp")).args(args).output().expect("the binary runs")
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
+/// A call that must fail: its exit code, and one line that holds `part`.
+fn refused(args: &[&str], code: i32, part: &str) {
+    let out = cusp(args);
+    let error = text(&out.stderr);
+    assert_eq!(out.status.code(), Some(code), "{args:?}: {error}");
+    assert_eq!(error.trim_end().lines().count(), 1, "{args:?}: {error}");
+    assert!(error.starts_with("cusp: ") && error.contains(part), "{args:?}: {error}");
+    assert!(out.stdout.is_empty(), "{args:?}");
+}
+
+fn path(p: &Path) -> &str {
+    p.to_str().expect("a plain path")
+}
+
+#[test]
+fn wrong_calls_are_refused_in_one_line() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = folder.path().join("out");
+    let o = path(&out);
+    for (args, part) in [
+        (vec!["compare", "nowhere", "--out", o], "built in: ring"),
+        (vec!["compare", "missing.toml", "--out", o], "no such file"),
+        (vec!["compare", "map.bsp", "--out", o], "cannot be read yet"),
+        (vec!["compare", "ring", "--photons", "0", "--out", o], "--photons: must lie in 1"),
+        (vec!["compare", "ring", "--photons", "-5", "--out", o], "--photons: must lie in 1"),
+        (vec!["compare", "ring", "--photons", "nan", "--out", o], "--photons"),
+        (vec!["compare", "ring", "--photons", "1e14", "--out", o], "--photons: must lie in"),
+        (vec!["compare", "ring", "--size", "0x10", "--out", o], "--size: 0x10"),
+        (vec!["compare", "ring", "--size", "99999x99999", "--out", o], "--size"),
+        (vec!["compare", "ring", "--size", "12", "--out", o], "WIDTHxHEIGHT"),
+        (vec!["compare", "ring", "--k", "0", "--out", o], "--k"),
+        (vec!["compare", "ring", "--footprint-scale", "-1", "--out", o], "--footprint-scale"),
+        (vec!["compare", "ring", "--footprint-scale", "nan", "--out", o], "--footprint-scale"),
+        (vec!["compare", "ring", "--gather", "octree", "--out", o], "one of knn, overlap"),
+        (vec!["compare", "ring", "--light", "dark", "--out", o], "one of all, direct"),
+        (vec!["compare", "ring", "--final-gather", "classic", "--out", o], "one of none"),
+        (vec!["compare", "ring", "--estimators", "sharp", "--out", o], "there are density"),
+        (vec!["compare", "ring", "--estimators", "multi_sampled:m=3", "--out", o], "it takes n, grid"),
+        (vec!["compare", "ring", "--crop", "500,0,100,10", "--out", o], "leaves the image"),
+        (vec!["compare", "ring", "--crop", "1,2,3", "--out", o], "x,y,width,height"),
+        (vec!["compare", "ring", "--threads", "0", "--out", o], "--threads"),
+        (vec!["compare", "ring", "--mask", "m.png", "--out", o], "--reference"),
+        (vec!["compare", "ring", "--reference", "none.exr", "--out", o], "none.exr"),
+        (vec!["compare", "--out", o], "<SCENE>"),
+        (vec!["render", "ring", "-o", "a.bmp"], ".exr or .png"),
+        (vec!["render", "ring", "-o", "a.exr", "--passes", "0"], "--passes"),
+        (vec!["render", "ring", "-o", "a.exr", "--seconds", "-1"], "--seconds"),
+        (vec!["paint"], "nor a file"),
+        (vec!["compare", "ring", "--colour"], "--colour"),
+    ] {
+        refused(&args, 2, part);
+    }
+    assert!(!out.exists(), "nothing is written for a wrong call");
+}
+
+#[test]
+fn wrong_scene_files_are_named_with_line_and_key() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let write = |name: &str, text: &str| {
+        let p = folder.path().join(name);
+        std::fs::write(&p, text).expect("writes");
+        p
+    };
+    let camera = "[camera]\nposition = [0, 1, 3]\ntarget = [0, 0, 0]\nfov_y = 40\n";
+    let material = "[materials.a]\nkind = \"diffuse\"\n";
+    let quad = "[[shapes]]\nkind = \"quad\"\nu = [1, 0, 0]\nv = [0, 0, -1]\nmaterial = \"a\"\n";
+    write("cut.obj", "v 0 0 0\nv 1 0 0\nv 0 1\n");
+    write("range.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n");
+    let mesh = |f: &str| format!("{camera}{material}[[shapes]]\nkind = \"mesh\"\nfile = \"{f}\"\nmaterial = \"a\"\n");
+    for (body, line, part) in [
+        (format!("{material}{quad}"), 1, "camera: there is none"),
+        (format!("{camera}fov_z = 3\n"), 5, "unknown field `fov_z`"),
+        (format!("{camera}{material}reflectance = [0.5, nan, 0.5]\n"), 7, "materials.a.reflectance"),
+        (format!("{camera}{material}reflectance = [0.5, -1, 0.5]\n"), 7, "[0, 1]"),
+        (format!("{camera}{material}ior = 1.5\n"), 7, "no such key"),
+        (
+            format!("{camera}{material}{quad}[[lights]]\nkind = \"point\"\nposition = [0, 1, 0]\npower = [-1, 0, 0]\n"),
+            15,
+            "not negative",
+        ),
+        (
+            format!("{camera}{material}{quad}[[lights]]\nkind = \"point\"\npower = [1, 0, 0]\n"),
+            12,
+            "lights[0].position",
+        ),
+        (format!("{camera}{material}{quad}[[lights]]\nkind = \"lamp\"\n"), 13, "point, sphere, quad"),
+        (format!("{camera}{quad}"), 9, "no material `a`"),
+        (format!("{camera}[render]\nphotons = 0\n"), 6, "render.photons"),
+        (format!("{camera}[render]\nestimator = \"sharp\"\n"), 6, "render.estimator"),
+        (camera.replace("40", "\"wide\""), 4, "fov_y"),
+        (camera.replace("40", "180"), 4, "camera.fov_y"),
+        (format!("{camera}[["), 5, ""),
+        (mesh("nowhere.obj"), 9, "no such file"),
+    ] {
+        let file = write("s.toml", &body);
+        refused(&["render", path(&file), "-o", "never.exr"], 2, &format!("s.toml:{line}: "));
+        refused(&["render", path(&file), "-o", "never.exr"], 2, part);
+    }
+    for (mesh_file, line) in [("cut.obj", 3), ("range.obj", 4)] {
+        let file = write("s.toml", &mesh(mesh_file));
+        refused(&["render", path(&file), "-o", "never.exr"], 2, &format!("{mesh_file}:{line}: "));
+    }
+    assert!(!Path::new("never.exr").exists());
+}
+
+#[test]
+fn a_place_that_cannot_be_written_is_failed_work() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("file");
+    std::fs::write(&file, "x").expect("writes");
+    let target = file.join("a.exr");
+    refused(&["render", "plane", "--size", "8x8", "-o", path(&target)], 1, "cannot be written");
+}
+
+#[test]
+fn compare_writes_all_its_files_and_a_report() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let o = path(folder.path());
+    let out = cusp(&[
+        "compare",
+        "ring",
+        "--size",
+        "128x128",
+        "--photons",
+        "5e4",
+        "--out",
+        o,
+        "--crop",
+        "40,40,64,48",
+        "--json",
+    ]);
+    assert!(out.status.success(), "{}", text(&out.stderr));
+    let report: serde_json::Value = serde_json::from_slice(&out.stdout).expect("JSON");
+    for key in [
+        "version",
+        "scene",
+        "estimator",
+        "gather",
+        "light",
+        "seed",
+        "threads",
+        "size",
+        "passes",
+        "photons_emitted",
+        "photons_stored",
+        "seconds",
+        "peak_rss_bytes",
+        "bounded",
+        "plan",
+        "estimators",
+    ] {
+        assert!(!report[key].is_null(), "{key}");
+    }
+    for key in ["load", "bvh", "photon_trace", "map_build", "view_trace", "gather", "estimate", "total"] {
+        assert!(report["seconds"][key].is_f64(), "{key}");
+    }
+    let estimators = report["estimators"].as_array().expect("a list");
+    assert_eq!(estimators.len(), 6);
+    for e in estimators {
+        assert!(e["error"]["relative_rmse"].as_f64().expect("a number").is_finite());
+        for file in e["files"].as_array().expect("a list") {
+            assert!(folder.path().join(file.as_str().expect("a name")).exists(), "{file}");
+        }
+    }
+    let written: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(folder.path().join("report.json")).expect("reads")).expect("JSON");
+    assert_eq!(written["estimators"], report["estimators"]);
+    let csv = std::fs::read_to_string(folder.path().join("timings.csv")).expect("reads");
+    assert_eq!(csv.lines().count(), 7);
+    let sheet = image::open(folder.path().join("sheet.png")).expect("a PNG");
+    assert!(sheet.width() > 6 * 64 * 3);
+    let crop = image::open(folder.path().join("integrated_crop.png")).expect("a PNG");
+    assert_eq!((crop.width(), crop.height()), (192, 144));
+    let bytes = std::fs::read(folder.path().join("integrated.exr")).expect("reads");
+    assert!(bytes.windows(12).any(|w| w == b"cusp compare"), "the EXR carries its command line");
+}
+
+#[test]
+fn render_writes_an_image_and_its_stats() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (exr, stats) = (folder.path().join("deep/a.exr"), folder.path().join("a.json"));
+    let args = [
+        "render",
+        "cornell",
+        "--size",
+        "32x24",
+        "--photons",
+        "5000",
+        "--passes",
+        "3",
+        "-o",
+        path(&exr),
+        "--stats",
+        path(&stats),
+    ];
+    let out = cusp(&args);
+    assert!(out.status.success(), "{}", text(&out.stderr));
+    assert!(text(&out.stdout).contains("3 passes"));
+    let image = image::open(&exr).expect("an EXR").to_rgb32f();
+    assert_eq!((image.width(), image.height()), (32, 24));
+    let json: serde_json::Value = serde_json::from_slice(&std::fs::read(&stats).expect("reads")).expect("JSON");
+    assert_eq!((json["passes"].as_u64(), json["photons_emitted"].as_u64()), (Some(3), Some(15_000)));
+    let png = folder.path().join("a.png");
+    assert!(cusp(&["render", "plane", "--size", "16x16", "--quiet", "-o", path(&png)]).stdout.is_empty());
+    assert_eq!(image::open(&png).expect("a PNG").width(), 16);
+}
+
+#[test]
+fn an_obj_is_a_scene() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let obj = folder.path().join("t.obj");
+    std::fs::write(&obj, "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 0\nf 1 2 3\nf 1 1 1\n").expect("writes");
+    let out = cusp(&["render", path(&obj), "--size", "32x32", "-o", path(&folder.path().join("a.exr"))]);
+    assert!(out.status.success(), "{}", text(&out.stderr));
+    assert!(text(&out.stderr).contains("without area"), "{}", text(&out.stderr));
+}
+
+#[test]
+fn lists_are_readable_by_people_and_programs() {
+    for (command, name) in [("scenes", "prism_wall"), ("estimators", "multi_sampled")] {
+        assert!(text(&cusp(&[command]).stdout).contains(name));
+        let json: serde_json::Value = serde_json::from_slice(&cusp(&[command, "--json"]).stdout).expect("JSON");
+        assert!(json[command].as_array().expect("a list").len() >= 6 && !json["version"].is_null());
+    }
+    let help = text(&cusp(&["compare", "--help"]).stdout);
+    for flag in ["--estimators", "--crop", "--truth", "--photons", "--footprint-scale", "--seed", "--json"] {
+        assert!(help.contains(flag), "{flag}");
+    }
+}
+
+#[test]
+fn without_a_command_the_ring_is_compared() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let o = path(folder.path());
+    let out = cusp(&["--out", o, "--size", "64x64", "--photons", "1e4"]);
+    assert!(out.status.success(), "{}", text(&out.stderr));
+    assert!(text(&out.stderr).contains("no window yet"));
+    assert!(text(&out.stdout).starts_with("ring: 64x64"));
+}
+
+/// Ctrl-C ends a long render cleanly: what is done is written, exit code 130.
+#[cfg(unix)]
+#[test]
+fn an_interrupted_render_writes_what_is_done() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let exr = folder.path().join("a.exr");
+    let child = Command::new(env!("CARGO_BIN_EXE_cusp"))
+        .args(["render", "ring", "--size", "64x64", "--photons", "2000", "--seconds", "600", "-o", path(&exr)])
+        .stdout(std::process::Stdio::piped())
+        .stderr(std::process::Stdio::piped())
+        .spawn()
+        .expect("the binary runs");
+    std::thread::sleep(std::time::Duration::from_secs(2));
+    let killed = Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("kill runs");
+    assert!(killed.success());
+    let out = child.wait_with_output().expect("ends");
+    assert_eq!(out.status.code(), Some(130), "{}", text(&out.stderr));
+    assert!(text(&out.stderr).contains("passes were written"), "{}", text(&out.stderr));
+    assert!(image::open(&exr).is_ok());
+}
