@@ -43,7 +43,7 @@ pub struct CompareArgs {
     /// Estimators, separated by commas; all with their defaults if left out
     #[arg(long, value_name = "A,B")]
     estimators: Option<String>,
-    /// Part to enlarge: x,y,width,height; where the picture changes most, if left out
+    /// Part to enlarge: x,y,width,height; where the estimators disagree most, if left out
     #[arg(long, value_name = "X,Y,W,H", value_parser = rect)]
     crop: Option<Rect>,
     /// Factor of enlargement, without smoothing
@@ -94,6 +94,8 @@ struct Comparison<'a> {
     args: &'a CompareArgs,
     renderer: Renderer,
     reference: Option<Reference>,
+    /// What was asked for and cannot be, though the rest can.
+    notes: Vec<String>,
     start: Instant,
     load: f64,
 }
@@ -103,7 +105,8 @@ impl<'a> Comparison<'a> {
     fn prepare(args: &'a CompareArgs) -> Result<Self, Failure> {
         let start = Instant::now();
         let scene = open(&args.scene)?;
-        let settings = args.flags.settings(&scene)?;
+        // Here `--estimator` may be a list, like `--estimators`.
+        let settings = CommonFlags { estimator: None, ..args.flags.clone() }.settings(&scene)?;
         let estimators = match (&args.estimators, &args.flags.estimator) {
             (Some(list), _) | (None, Some(list)) => registry::estimators(list)?,
             (None, None) => ESTIMATORS.iter().filter_map(|e| e.default_estimator()).collect(),
@@ -119,13 +122,30 @@ impl<'a> Comparison<'a> {
             Some(path) => Some(Reference::from_files(path, args.mask.as_deref()).map_err(Failure::Call)?),
             None => Reference::built_in(&args.scene).map_err(Failure::Work)?,
         };
-        // A reference shows all light; of any other there is no error to speak of.
-        let reference = reference.filter(|_| settings.light == LightPart::All);
-        if let (Some(r), true) = (&reference, args.reference.is_some()) {
-            r.error_of(&Image::black(settings.size)).map_err(|e| Failure::Call(format!("--reference: {e}")))?;
-        }
+        let mut notes = Vec::new();
+        let reference = match (reference, &args.reference) {
+            // A reference shows all light; of any other there is no error to speak of.
+            (Some(_), _) if settings.light != LightPart::All => {
+                notes.push("a reference shows all light: no error against it without --light all".to_owned());
+                None
+            }
+            (Some(r), given) => match (r.error_of(&Image::black(settings.size)), given) {
+                (Ok(_), _) => Some(r),
+                (Err(why), Some(_)) => return Err(Failure::Call(format!("--reference: {why}"))),
+                (Err(why), None) => {
+                    notes.push(format!("no error against the built-in reference: {why}"));
+                    None
+                }
+            },
+            (None, _) => None,
+        };
         let load = start.elapsed().as_secs_f64();
-        Ok(Self { args, renderer: Renderer::new(scene, settings, estimators), reference, start, load })
+        // The truth is made of the same photons, so the plan has to serve it too.
+        let regular = Regular::with_rays(TRUTH_RAYS);
+        let truth = [Slot { estimator: &regular, gather: settings.gather }];
+        let also: &[Slot] = if args.truth == Truth::None { &[] } else { &truth };
+        let renderer = Renderer::planned_for(scene, settings, estimators, also);
+        Ok(Self { args, renderer, reference, notes, start, load })
     }
 
     fn run(mut self) -> Result<(), Failure> {
@@ -265,7 +285,11 @@ impl<'a> Comparison<'a> {
         let estimators: Vec<_> = estimators.collect();
         let first = estimators.first().map_or(String::new(), |e| e.id.clone());
         CompareReport {
-            render: RenderReport::new(r, first, self.load, self.start.elapsed().as_secs_f64()),
+            render: {
+                let mut render = RenderReport::new(r, first, self.load, self.start.elapsed().as_secs_f64());
+                render.warnings.extend(self.notes.iter().cloned());
+                render
+            },
             crop,
             truth: truth.map(|t| t.0),
             reference: self.reference.as_ref().map(|r| r.source.clone()),

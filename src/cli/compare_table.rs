@@ -76,7 +76,7 @@ pub fn text(report: &CompareReport, folder: &Path) -> String {
         out.push_str(&format!(
             "  photons and maps: {:.3} s and {} stored as planned; {:.3} s and {} stored with every part on ({:.2} x)\n",
             cost.needed_seconds, cost.needed_stored, cost.full_seconds, cost.full_stored,
-            if cost.needed_seconds > 0.0 { cost.full_seconds / cost.needed_seconds } else { 1.0 }
+            if cost.needed_stored > 0 { cost.full_seconds / cost.needed_seconds } else { 1.0 }
         ));
     }
     out.push_str(&format!("\n{:.1} s in all; files in {}\n", r.seconds.total, folder.display()));

@@ -20,10 +20,10 @@ pub fn write(path: &Path, image: &Image, provenance: &Provenance) -> Result<(), 
         let p = image.at(x as u32, y as u32);
         (p.x, p.y, p.z)
     });
+    // One attribute: the library keeps them without an order, and the same image should give the same bytes.
     let mut attributes = LayerAttributes::default();
-    for (key, value) in provenance.pairs() {
-        attributes.other.insert(Text::from(key), AttributeValue::Text(ascii(&value)));
-    }
+    let facts: Vec<String> = provenance.pairs().iter().map(|(k, v)| format!("{k} = {v}")).collect();
+    attributes.other.insert(Text::from("cusp"), AttributeValue::Text(ascii(&facts.join("\n"))));
     let layer = Layer::new((w as usize, h as usize), attributes, Encoding::SMALL_LOSSLESS, channels);
     let mut bytes = Vec::new();
     ExrImage::from_layer(layer)
@@ -63,6 +63,8 @@ mod tests {
         let back = Reference::from_files(&path, None).expect("reads");
         assert_eq!(back.image, image);
         let bytes = std::fs::read(&path).expect("reads");
+        write(&path, &image, &provenance).expect("writes");
+        assert_eq!(std::fs::read(&path).expect("reads"), bytes, "the same bytes each time");
         assert!(bytes.windows(16).any(|w| w == b"cusp render ring"));
     }
 }

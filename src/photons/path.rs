@@ -10,6 +10,7 @@ use crate::photons::{Photon, PhotonKind, StoredPhotons};
 use crate::scene::{Material, Scene};
 use crate::trace::scatter::{reflected, refracted, specular_weights};
 use crate::trace::{Differential, Intersector, Ray, Surface};
+use glam::Vec3;
 use serde::Serialize;
 use std::ops::AddAssign;
 
@@ -65,6 +66,37 @@ pub struct Flight<'a> {
     pub settings: PathSettings,
     /// Numbers of the pass: set 0 is emission's, set `1 + b` bounce `b`'s.
     pub sequence: Sequence,
+}
+
+/// A sphere around all specular surfaces.
+#[derive(Clone, Copy, Debug)]
+pub struct SpecularBounds {
+    /// Centre, metres.
+    pub center: Vec3,
+    /// Radius, metres.
+    pub radius: f32,
+}
+
+impl SpecularBounds {
+    /// Bounds of a scene's specular surfaces; None without any.
+    pub fn of(scene: &Scene) -> Option<Self> {
+        let g = &scene.geometry;
+        let boxes =
+            (0..g.primitive_count()).filter(|&i| scene.materials[g.material(i)].is_specular()).map(|i| g.bounds(i));
+        let (low, high) = boxes.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))?;
+        // Rounding of the test below must not lose a photon that grazes the sphere.
+        let radius = (high - low).length() / 2.0 + 1e-4 * scene.radius;
+        Some(Self { center: (low + high) / 2.0, radius })
+    }
+
+    /// Whether a ray may meet the sphere.
+    pub fn may_meet(&self, origin: Vec3, direction: Vec3) -> bool {
+        let to = self.center - origin;
+        let along = to.dot(direction);
+        let off = to - direction * along;
+        off.length_squared() <= self.radius * self.radius
+            && (along >= 0.0 || to.length_squared() <= self.radius * self.radius)
+    }
 }
 
 impl Flight<'_> {

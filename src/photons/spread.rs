@@ -3,7 +3,7 @@
 use crate::math::frame::tangents;
 use crate::photons::emission::{cone_radius, cosine_solid_angle};
 use crate::trace::Differential;
-use glam::{Quat, Vec3};
+use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 /// The rule for a diffuse bounce.
@@ -31,11 +31,21 @@ pub fn bounce(rule: DiffuseSpread, d: &Differential, v: Vec3, w: Vec3, cos: f32,
             (Differential { dp: d.dp, dv: polar_factor(d.dp, w).map(|c| c * r) }, bounded)
         }
         DiffuseSpread::AsPublished => {
-            let turn = Quat::from_rotation_arc(v.normalize(), w.normalize());
             let grow = 2.0 * std::f32::consts::SQRT_2;
-            (Differential { dp: d.dp.map(|c| c * grow), dv: d.dv.map(|c| turn * c) }, false)
+            (Differential { dp: d.dp.map(|c| c * grow), dv: d.dv.map(|c| turned(c, v, w)) }, false)
         }
     }
+}
+
+/// `x` under the shortest rotation that takes the unit vector `v` to `w`; a half turn if they are opposite.
+fn turned(x: Vec3, v: Vec3, w: Vec3) -> Vec3 {
+    let cos = v.dot(w);
+    if cos < -0.999_999 {
+        let (axis, _) = tangents(v);
+        return axis * (2.0 * axis.dot(x)) - x;
+    }
+    let axis = v.cross(w);
+    x * cos + axis.cross(x) + axis * (axis.dot(x) / (1.0 + cos))
 }
 
 /// Orthonormal columns across `w` that are nearest to `dp` seen along `w`; any if `dp` vanishes.
@@ -86,6 +96,17 @@ mod tests {
         let (out, bounded) = bounce(DiffuseSpread::Polar, &Differential::default(), Vec3::NEG_Y, Vec3::Y, 1.0, 100);
         assert!(!bounded);
         assert!((out.dv[0].length() - 0.1).abs() < 1e-6 && out.dv[0].dot(out.dv[1]).abs() < 1e-8);
+    }
+
+    #[test]
+    fn turning_takes_one_direction_to_the_other() {
+        let v = Vec3::new(0.36, -0.48, 0.8);
+        for w in [Vec3::X, Vec3::NEG_Z, v, -v] {
+            assert!((turned(v, v, w) - w).length() < 1e-5);
+            let (t, _) = tangents(v);
+            let across = turned(t, v, w);
+            assert!(across.dot(w).abs() < 1e-5 && (across.length() - 1.0).abs() < 1e-5);
+        }
     }
 
     #[test]

@@ -4,7 +4,7 @@ use crate::math::hash::mix;
 use crate::math::sequence::{Sampling, Sequence};
 use crate::photons::emission::{emit, share_photons};
 use crate::photons::map::{FootprintLimits, MapParts};
-use crate::photons::path::{Flight, PathCounts, PathSettings};
+use crate::photons::path::{Flight, PathCounts, PathSettings, SpecularBounds};
 use crate::photons::{Photon, PhotonMap, StoredPhotons};
 use crate::render::plan::Plan;
 use crate::scene::Scene;
@@ -53,6 +53,9 @@ impl Emitter<'_> {
             .enumerate()
             .flat_map(|(s, share)| (0..share.count).step_by(CHUNK as usize).map(move |first| (s, first)))
             .collect();
+        // Where nothing but caustic photons is kept, those that cannot meet a specular surface need not be followed.
+        let only_caustic = self.path.caustic && !self.path.direct && !self.path.global;
+        let aim = if only_caustic { SpecularBounds::of(self.scene) } else { None };
         let parts: Vec<PhotonPass> = chunks
             .par_iter()
             .map(|&(s, first)| {
@@ -70,8 +73,10 @@ impl Emitter<'_> {
                 };
                 for i in first..(first + CHUNK).min(share.count) {
                     let emission = emit(self.scene, light, share.count, flight.sequence.four(i, 0));
-                    flight.trace(i, &emission, share.power, share.count, &mut part.stored, &mut part.counts);
                     part.emitted += 1;
+                    if aim.is_none_or(|a| a.may_meet(emission.origin, emission.direction)) {
+                        flight.trace(i, &emission, share.power, share.count, &mut part.stored, &mut part.counts);
+                    }
                 }
                 part
             })

@@ -72,7 +72,6 @@ impl Plan {
             items.push(PlanItem { part, on, why });
             on
         };
-        let forced = |why: String| if full { "forced on".to_owned() } else { why };
 
         let has_specular = scene.has_specular();
         let caustic_map = {
@@ -98,6 +97,12 @@ impl Plan {
             "photon bounces after a diffuse surface",
             global_map,
             if global_map { "the global map wants them".into() } else { "there is no global map".into() },
+        );
+        let only_caustic = caustic_map && !global_map && !direct_by_photons;
+        item(
+            "photons that miss all specular surfaces",
+            !only_caustic && (caustic_map || global_map || direct_by_photons),
+            if only_caustic { "they cannot become caustic".into() } else { "followed with the others, if any".into() },
         );
         let direct_map = item(
             "direct photons",
@@ -126,31 +131,37 @@ impl Plan {
         let photon_differentials = item(
             "photon differentials",
             any_map && (footprints || full),
-            forced(if !any_map {
+            if !any_map {
                 "there is no photon map".into()
             } else if footprints {
                 "estimators use footprints".into()
+            } else if full {
+                "forced on".into()
             } else {
                 "no estimator uses footprints".into()
-            }),
+            },
         );
         let views = slots.iter().any(|s| needs_view_footprint(s.estimator));
         let view_differentials = item(
             "view differentials",
             any_map && (views || full),
-            forced(if !any_map {
+            if !any_map {
                 "there is no photon map".into()
             } else if views {
                 "estimators use the view footprint".into()
+            } else if full {
+                "forced on".into()
             } else {
                 "no estimator uses the view footprint".into()
-            }),
+            },
         );
         let uses_knn = |s: &Slot| s.gather == Gather::Knn || s.estimator.lookup() == Lookup::Disc;
         let kd_tree = item(
             "kd-tree",
             any_map && slots.iter().any(uses_knn),
-            if slots.iter().any(uses_knn) {
+            if !any_map {
+                "there is no photon map".into()
+            } else if slots.iter().any(uses_knn) {
                 "for the k nearest".into()
             } else {
                 "nothing looks up the k nearest".into()
@@ -160,7 +171,13 @@ impl Plan {
         let overlap = item(
             "footprint hierarchy",
             any_map && by_overlap,
-            if by_overlap { "for overlap".into() } else { "nothing gathers by overlap".into() },
+            if !any_map {
+                "there is no photon map".into()
+            } else if by_overlap {
+                "for overlap".into()
+            } else {
+                "nothing gathers by overlap".into()
+            },
         );
         item(
             "specular view paths",

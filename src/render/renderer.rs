@@ -66,11 +66,23 @@ pub struct Renderer {
 impl Renderer {
     /// Prepares a render: builds the hierarchy and makes the plan.
     pub fn new(scene: Scene, settings: RenderSettings, estimators: Vec<Box<dyn Estimator>>) -> Self {
+        Self::planned_for(scene, settings, estimators, &[])
+    }
+
+    /// The same with a plan that also serves `also`, for passes over the same photons by other estimators.
+    pub fn planned_for(
+        scene: Scene,
+        settings: RenderSettings,
+        estimators: Vec<Box<dyn Estimator>>,
+        also: &[Slot],
+    ) -> Self {
         let start = Instant::now();
         let intersector = Intersector::new(&scene.geometry, scene.radius);
         let bvh = start.elapsed().as_secs_f64();
         let start = Instant::now();
-        let plan = Plan::new(&scene, &intersector, &settings, &slots(&estimators, settings.gather));
+        let mut served = slots(&estimators, settings.gather);
+        served.extend_from_slice(also);
+        let plan = Plan::new(&scene, &intersector, &settings, &served);
         let planned = start.elapsed().as_secs_f64();
         let size = settings.size;
         Self {
@@ -148,12 +160,12 @@ impl Renderer {
         self.bounded.footprint_floor += floor;
         self.bounded.footprint_ceiling += ceiling;
         self.inside_glass += result.counts.camera_inside_glass;
+        self.seconds.view_trace += result.view_trace;
         for (i, s) in result.seconds.iter().enumerate() {
             self.estimator_seconds[i].view_trace += s.view_trace;
             self.estimator_seconds[i].gather += s.gather;
             self.estimator_seconds[i].estimate += s.estimate;
             self.gathered[i] += result.gathered[i];
-            self.seconds.view_trace += s.view_trace;
             self.seconds.gather += s.gather;
             self.seconds.estimate += s.estimate;
         }

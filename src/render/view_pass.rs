@@ -57,6 +57,8 @@ pub struct TileResult {
     pub rect: Rect,
     /// One image for each slot.
     pub images: Vec<TileImage>,
+    /// Thread seconds of all view rays of the tile; slots with the same rays share them.
+    pub view_trace: f64,
     /// Counts of the view paths.
     pub counts: ViewCounts,
 }
@@ -77,8 +79,10 @@ pub struct ViewPass<'a> {
 pub struct ViewResult {
     /// Its tiles in order; fewer if cancelled.
     pub tiles: Vec<TileResult>,
-    /// Wall seconds of each slot, scaled from thread seconds.
+    /// Wall seconds of each slot as if it were alone, scaled from thread seconds.
     pub seconds: Vec<PartSeconds>,
+    /// Wall seconds of all view rays, those that slots share once.
+    pub view_trace: f64,
     /// Wall seconds of everything.
     pub wall: f64,
     /// Photons looked at by each slot.
@@ -125,7 +129,9 @@ impl ViewPass<'_> {
         let wall = start.elapsed().as_secs_f64();
         let tiles: Vec<TileResult> = results.into_iter().flatten().collect();
         let complete = tiles.len() == all.len();
-        let spent: f64 = tiles.iter().flat_map(|t| t.images.iter().map(|i| i.seconds.total())).sum();
+        let view_trace: f64 = tiles.iter().map(|t| t.view_trace).sum();
+        let others = tiles.iter().flat_map(|t| t.images.iter().map(|i| i.seconds.gather + i.seconds.estimate));
+        let spent = view_trace + others.sum::<f64>();
         let scale = if spent > 0.0 { wall / spent } else { 0.0 };
         let mut seconds = vec![PartSeconds::default(); slots.len()];
         let mut gathered = vec![0; slots.len()];
@@ -138,7 +144,7 @@ impl ViewPass<'_> {
                 gathered[i] += image.gathered;
             }
         }
-        ViewResult { tiles, seconds, wall, gathered, counts, complete }
+        ViewResult { view_trace: view_trace * scale, tiles, seconds, wall, gathered, counts, complete }
     }
 
     /// One tile. Slots take turns at being first, so that none always finds the caches cold.
@@ -148,10 +154,12 @@ impl ViewPass<'_> {
         let mut rays: Vec<u32> = slots.iter().map(|s| s.estimator.rays_per_axis()).collect();
         rays.sort_unstable();
         rays.dedup();
+        let mut all_rays = 0.0;
         for n in rays {
             let start = Instant::now();
             let base = self.trace(rect, n, scratch, &mut counts);
             let view_trace = start.elapsed().as_secs_f64();
+            all_rays += view_trace;
             for k in 0..slots.len() {
                 let i = (k + number) % slots.len();
                 if slots[i].estimator.rays_per_axis() == n {
@@ -165,6 +173,7 @@ impl ViewPass<'_> {
             rect,
             // Each slot's number of rays is in the list that was just gone through.
             images: images.into_iter().flatten().collect(),
+            view_trace: all_rays,
             counts,
         }
     }
@@ -174,7 +183,10 @@ impl ViewPass<'_> {
         let t = &self.tracer;
         let camera = &t.scene.camera;
         let size = t.settings.size;
-        let half = 0.5 / n as f32 * self.area_factor.sqrt();
+        // A random cell of a grid that grows finer, seen through a footprint of the cell's size: every pass is an
+        // unbiased sample of the box-filtered pixel, and edges of surfaces are resolved in the end.
+        let cells = cells_of_pass(self.pass) as f32;
+        let half = 0.5 / (n as f32 * cells);
         let mut base = vec![Rgb::ZERO; (rect.width * rect.height) as usize];
         scratch.hits.clear();
         for (pixel, sum) in base.iter_mut().enumerate() {
@@ -186,7 +198,7 @@ impl ViewPass<'_> {
                 let index = u64::from(self.pass) * u64::from(n * n) + u64::from(cell);
                 let jitter = (self.pass > 0).then(|| {
                     let x = sequence.four(index, 0);
-                    [x[0], x[1]]
+                    [((x[0] * cells).floor() + 0.5) / cells, ((x[1] * cells).floor() + 0.5) / cells]
                 });
                 let (px, py) = sample_position([x, y], [cell % n, cell / n], n, jitter);
                 let (direction, differential) = camera.ray(px, py, size, half);
@@ -264,7 +276,42 @@ impl ViewPass<'_> {
     }
 }
 
+/// Cells along a pixel's side from which the view ray of a pass (from 0) is drawn: 1, then 2 up to pass 15, 4 up to
+/// pass 255, and so on. Powers of two, because so many Sobol points in a row visit each cell once.
+fn cells_of_pass(pass: u32) -> u32 {
+    let mut cells = 1;
+    let mut next = 1;
+    while u64::from(pass) >= next {
+        cells *= 2;
+        next *= 16;
+    }
+    cells
+}
+
 /// Sums beyond f32 become its largest number, so that no infinity reaches an image.
 fn finite(sum: DVec3) -> Rgb {
     sum.clamp(DVec3::ZERO, DVec3::splat(f64::from(f32::MAX))).as_vec3()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cells_grow_as_the_fourth_root() {
+        let cells: Vec<u32> = [0, 1, 15, 16, 255, 256, u32::MAX].map(cells_of_pass).into();
+        assert_eq!(cells, [1, 2, 2, 4, 4, 8, 256]);
+    }
+
+    /// Sixteen passes from a multiple of sixteen on see each of the 4×4 cells once.
+    #[test]
+    fn passes_visit_all_cells() {
+        let sequence = Sequence::new(Sampling::Sobol, 99);
+        let mut seen = [0; 16];
+        for pass in 32..48 {
+            let x = sequence.four(pass, 0);
+            seen[(x[0] * 4.0) as usize * 4 + (x[1] * 4.0) as usize] += 1;
+        }
+        assert_eq!(seen, [1; 16]);
+    }
 }

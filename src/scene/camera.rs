@@ -1,6 +1,5 @@
-//! The pinhole camera and its ray differentials.
+//! The pinhole camera.
 
-use crate::trace::differential::Differential;
 use glam::Vec3;
 
 /// A pinhole camera.
@@ -14,45 +13,4 @@ pub struct Camera {
     pub tan_half_fov_y: f32,
     /// Pixels across and down, as the scene asks.
     pub resolution: [u32; 2],
-}
-
-impl Camera {
-    /// Unit direction through the point `(x, y)` of an image of `size` pixels, `y` down, and its differential
-    /// for half-steps of `half` pixels along x and y (Igehy 1999, eq. 8; Pedersen 2011, eq. 20).
-    ///
-    /// With `half = 0.5` the parallelogram `±dP₀ ± dP₁` at the hit covers one pixel.
-    pub fn ray(&self, x: f32, y: f32, size: [u32; 2], half: f32) -> (Vec3, Differential) {
-        let [right, up, forward] = self.frame;
-        let step = 2.0 * self.tan_half_fov_y / size[1] as f32;
-        let v = forward + right * ((x - size[0] as f32 / 2.0) * step) + up * ((size[1] as f32 / 2.0 - y) * step);
-        let length = v.length();
-        let direction = v / length;
-        let along = |dx: Vec3| (dx - direction * direction.dot(dx)) / length;
-        let dv = [along(right * (step * half)), along(up * (-step * half))];
-        (direction, Differential { dp: [Vec3::ZERO; 2], dv })
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn differential_is_the_derivative_of_the_direction() {
-        let camera = Camera {
-            position: Vec3::ZERO,
-            frame: [Vec3::X, Vec3::Y, Vec3::NEG_Z],
-            tan_half_fov_y: 0.7,
-            resolution: [64, 48],
-        };
-        let size = [64, 48];
-        let (_, d) = camera.ray(11.3, 40.2, size, 0.5);
-        let h = 0.05;
-        for (axis, (dx, dy)) in [(h, 0.0), (0.0, h)].into_iter().enumerate() {
-            let (p, _) = camera.ray(11.3 + dx, 40.2 + dy, size, 0.5);
-            let (m, _) = camera.ray(11.3 - dx, 40.2 - dy, size, 0.5);
-            let finite = (p - m) / (2.0 * h) * 0.5;
-            assert!((finite - d.dv[axis]).length() < 1e-3 * d.dv[axis].length(), "{axis}");
-        }
-    }
 }

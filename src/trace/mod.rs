@@ -5,6 +5,7 @@ pub mod intersector;
 pub mod scatter;
 pub mod surface;
 pub mod triangle;
+pub mod view_ray;
 
 pub use differential::Differential;
 pub use intersector::{Hit, Intersector, Ray};

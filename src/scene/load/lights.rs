@@ -68,8 +68,8 @@ impl Loader<'_> {
                     },
                     _ => {
                         let cone = self.required(key, "cone", l.cone)?;
-                        if !(cone > 0.0 && cone <= 360.0) {
-                            return self.wrong(at("cone"), format!("must lie in (0, 360] degrees, got {cone}"));
+                        if !(1.0..=360.0).contains(&cone) {
+                            return self.wrong(at("cone"), format!("must lie in [1, 360] degrees, got {cone}"));
                         }
                         let falloff = l.falloff.unwrap_or(0.0);
                         if !(0.0..=1e4).contains(&falloff) {

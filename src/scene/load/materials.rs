@@ -1,6 +1,7 @@
 //! Materials of a scene file.
 
 use super::{Checked, Loader};
+use crate::math::hash::{FNV_START, fnv1a};
 use crate::math::rgb::Rgb;
 use crate::scene::Material;
 use crate::scene::scene_file::MaterialFile;
@@ -19,7 +20,7 @@ impl Loader<'_> {
         Ok(())
     }
 
-    pub(super) fn material(&self, key: &str, file: &MaterialFile) -> Checked<Material> {
+    pub(super) fn material(&mut self, key: &str, file: &MaterialFile) -> Checked<Material> {
         let at = |k: &str| format!("{key}.{k}");
         let allowed: &[&str] = match file.kind.as_str() {
             "diffuse" => &["reflectance", "texture"],
@@ -74,10 +75,13 @@ impl Loader<'_> {
         })
     }
 
-    pub(super) fn texture(&self, key: &str, name: &str) -> Checked<Texture> {
+    pub(super) fn texture(&mut self, key: &str, name: &str) -> Checked<Texture> {
         let Some(path) = self.files.path(name) else {
             return self.wrong(key, "a built-in scene has no textures");
         };
+        // Its bytes belong to the scene's hash; that they cannot be read is reported below.
+        let bytes = std::fs::read(&path).unwrap_or_default();
+        self.texts.push(format!("{:016x}", fnv1a(FNV_START, &bytes)));
         Texture::load(&path).or_else(|why| self.wrong(key, format!("{}: {why}; give a PNG", path.display())))
     }
 }

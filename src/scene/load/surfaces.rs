@@ -70,7 +70,14 @@ impl Loader<'_> {
                 Some(m) => Some(*m),
                 None => {
                     let known: Vec<_> = self.material_index.keys().cloned().collect();
-                    return self.wrong(at("material"), format!("no material `{name}`; there are {}", known.join(", ")));
+                    return self.wrong(
+                        at("material"),
+                        if known.is_empty() {
+                            format!("no material `{name}`; add [materials.{name}]")
+                        } else {
+                            format!("no material `{name}`; there are {}", known.join(", "))
+                        },
+                    );
                 }
             },
             None if s.kind == "mesh" => None,
@@ -176,8 +183,16 @@ impl Loader<'_> {
             return Ok(());
         }
         let mut own = Vec::new();
-        for (name, file) in &obj.materials {
-            let made = self.material(&format!("materials.{name} of {}", path.display()), file)?;
+        // Textures are named relative to the mesh, like its material file.
+        let folder = std::path::Path::new(name).parent().map(|p| p.to_path_buf()).unwrap_or_default();
+        for (material, mut file) in obj.materials {
+            file.texture = file.texture.map(|t| folder.join(t).to_string_lossy().into_owned());
+            let made = self.material(&format!("material {material}"), &file).map_err(|e| match e {
+                SceneError::At { key, what, .. } => {
+                    SceneError::Whole { file: path.clone(), what: format!("its {key}: {what}") }
+                }
+                other => other,
+            })?;
             own.push(self.assembly.add_material(made));
         }
         let mut fallback = NONE;
