@@ -132,6 +132,86 @@ fn lights_add_up() {
     check_blocks(&image, &camera, irradiance, 32, "three lights");
 }
 
+fn load(body: &str) -> Scene {
+    let files = cusp::scene::source::Files::BuiltIn(&[]);
+    cusp::scene::load::scene_from_toml(std::path::Path::new("t.toml"), body, &files).expect("loads")
+}
+
+/// Mean radiance of the middle quarter of a 64×64 image.
+fn middle(scene: Scene, flags: &RenderFile, passes: u32) -> f32 {
+    let settings = RenderSettings::new(&scene, flags, Some([64, 64]), 2).expect("valid");
+    let mut renderer = Renderer::new(scene, settings, vec![estimator("integrated").expect("registered")]);
+    for _ in 0..passes {
+        renderer.step(&Watch::SILENT);
+    }
+    cusp::measure::metrics::region_mean(&renderer.films()[0].image(), [16, 16, 48, 48]).x
+}
+
+/// Shadow rays to lights that have a surface of their own, close to the floor and far from it, against stored photons
+/// or the equivalent point light.
+#[test]
+fn lights_do_not_shade_themselves() {
+    let floor = |size: f32, eye: &str| {
+        format!(
+            "[camera]\nposition = {eye}\ntarget = [0, 0, 0]\nup = [0, 0, -1]\nfov_y = 20\n\
+             [materials.a]\nkind = \"diffuse\"\nreflectance = [0.5, 0.5, 0.5]\n\
+             [[shapes]]\nkind = \"quad\"\nu = [{size}, 0, 0]\nv = [0, 0, -{size}]\nmaterial = \"a\"\n"
+        )
+    };
+    let by = |direct: &str, photons: i64| RenderFile {
+        light: Some("direct".into()),
+        direct: Some(direct.into()),
+        photons: Some(photons),
+        shadow_rays: Some(64),
+        ..Default::default()
+    };
+    // A quad 5 cm over a floor of 40 m, seen obliquely from its side.
+    let low = format!(
+        "{}[[lights]]\nkind = \"quad\"\ncenter = [0, 0.05, 2]\nu = [0.5, 0, 0]\nv = [0, 0, 0.5]\npower = [9, 9, 9]\n",
+        floor(20.0, "[0, 6, 0]").replace("target = [0, 0, 0]", "target = [0, 0, 0.6]")
+    );
+    let (rays, photons) =
+        (middle(load(&low), &by("shadow_rays", 1), 4), middle(load(&low), &by("photons", 2_000_000), 2));
+    assert!((rays / photons - 1.0).abs() < 0.02, "low quad: {rays} {photons}");
+    // Small spheres light like points, near and far.
+    for (radius, height) in [(0.02f32, 0.1f32), (0.003, 1.0), (0.05, 30.0), (0.003, 30.0), (1e-9, 30.0)] {
+        let eye = "[0, 1.5, 0.001]";
+        let sphere = format!(
+            "{}[[lights]]\nkind = \"sphere\"\nradius = {radius}\nposition = [0.5, {height}, 0.4]\npower = [9, 9, 9]\n",
+            floor(20.0, eye)
+        );
+        let point = sphere.replace("sphere", "point").replace(&format!("radius = {radius}\n"), "");
+        let rays = by("shadow_rays", 1);
+        let (sphere, point) = (middle(load(&sphere), &rays, 1), middle(load(&point), &rays, 1));
+        assert!((sphere / point - 1.0).abs() < 5e-3, "sphere of {radius} at {height}: {sphere} {point}");
+    }
+}
+
+/// A floor under a plane of tinted glass: radiance falls by n² on its way out, and both ways absorb.
+#[test]
+fn light_leaves_a_medium_by_its_index_squared() {
+    for (tint, ways) in [(1.0f32, 1.0f32), (0.5, 0.25)] {
+        let scene = load(&format!(
+            "[camera]\nposition = [0, 5, 0]\ntarget = [0, 0, 0]\nup = [0, 0, -1]\nfov_y = 4\n\
+             [materials.a]\nkind = \"diffuse\"\nreflectance = [0.5, 0.5, 0.5]\n\
+             [materials.g]\nkind = \"dielectric\"\nior = 1.5\ntransmittance = [{tint}, {tint}, {tint}]\n\
+             [[shapes]]\nkind = \"quad\"\nu = [2, 0, 0]\nv = [0, 0, -2]\nmaterial = \"a\"\n\
+             [[shapes]]\nkind = \"quad\"\ncenter = [0, 1, 0]\nu = [2, 0, 0]\nv = [0, 0, -2]\nmaterial = \"g\"\n\
+             [[lights]]\nkind = \"directional\"\ndirection = [0, -1, 0]\nirradiance = [10, 10, 10]\n"
+        ));
+        let flags = RenderFile {
+            photons: Some(1_000_000),
+            light: Some("caustic".into()),
+            split_depth: Some(2),
+            ..Default::default()
+        };
+        let got = middle(scene, &flags, 1);
+        let through = 1.0 - cusp::trace::scatter::fresnel(1.0, 1.0 / 1.5);
+        let expected = 10.0 * through * 0.5 / PI * through / 2.25 * ways;
+        assert!((got / expected - 1.0).abs() < 0.02, "tint {tint}: {got} {expected}");
+    }
+}
+
 fn closed_box(reflectance: f32) -> Scene {
     let text = format!(
         "[camera]\nposition = [0.5, 0.2, 0]\ntarget = [0, 0, 0]\nfov_y = 60\n\

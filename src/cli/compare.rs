@@ -52,7 +52,7 @@ pub struct CompareArgs {
     /// Where errors are taken against regular with 16×16 view rays
     #[arg(long, value_enum, default_value = "crop")]
     truth: Truth,
-    /// Image to compare with (EXR or PNG), instead of a built-in scene's own
+    /// Image to compare with (EXR, linear radiance), instead of a built-in scene's own
     #[arg(long, value_name = "R.exr")]
     reference: Option<PathBuf>,
     /// Pixels of the reference that count (PNG, white)
@@ -107,6 +107,9 @@ impl<'a> Comparison<'a> {
         let scene = open(&args.scene)?;
         // Here `--estimator` may be a list, like `--estimators`.
         let settings = CommonFlags { estimator: None, ..args.flags.clone() }.settings(&scene)?;
+        if args.estimators.is_some() && args.flags.estimator.is_some() {
+            return Err(Failure::Call("--estimator: is in --estimators already; give one of them".into()));
+        }
         let estimators = match (&args.estimators, &args.flags.estimator) {
             (Some(list), _) | (None, Some(list)) => registry::estimators(list)?,
             (None, None) => ESTIMATORS.iter().filter_map(|e| e.default_estimator()).collect(),

@@ -74,8 +74,8 @@ pub fn text(report: &CompareReport, folder: &Path) -> String {
     }
     if let Some(cost) = &report.plan_cost {
         out.push_str(&format!(
-            "  photons and maps: {:.3} s and {} stored as planned; {:.3} s and {} stored with every part on ({:.2} x)\n",
-            cost.needed_seconds, cost.needed_stored, cost.full_seconds, cost.full_stored,
+            "  pilot {:.3} s, once; photons and maps: {:.3} s and {} stored as planned; {:.3} s and {} stored with every part on ({:.2} x)\n",
+            r.seconds.plan, cost.needed_seconds, cost.needed_stored, cost.full_seconds, cost.full_stored,
             if cost.needed_stored > 0 { cost.full_seconds / cost.needed_seconds } else { 1.0 }
         ));
     }

@@ -61,7 +61,8 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
         Some(Command::Estimators(args)) => lists::estimators(&args),
         None => {
             let scene = cli.scene.unwrap_or_else(|| "ring".into());
-            if !cli.flags.quiet && !cli.flags.json {
+            // A scene that can't be opened has its own line.
+            if !cli.flags.quiet && !cli.flags.json && crate::scene::open(&scene).is_ok() {
                 eprintln!("There is no window yet: comparing the estimators on {scene}.");
             }
             compare::run(&compare::CompareArgs::of(scene, cli.flags))

@@ -29,7 +29,7 @@ pub struct RenderArgs {
     #[arg(long, value_name = "P", value_parser = clap::value_parser!(u32).range(1..), conflicts_with = "seconds")]
     passes: Option<u32>,
     /// Render passes for so many seconds; the pass that is running is finished
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
     seconds: Option<f64>,
     /// Write what it cost and what was left out
     #[arg(long, value_name = "FILE")]

@@ -16,7 +16,7 @@ fn photon(footprint: [Vec3; 2]) -> MapPhoton {
         power: Rgb::ONE,
         footprint,
     };
-    let limits = FootprintLimits { scale: 1.0, floor: 1e-6, ceiling: 1e3 };
+    let limits = FootprintLimits { scale: 1.0, floor: 1e-7, ceiling: 1e3 };
     let map = PhotonMap::new(&[p], limits, MapParts { kd_tree: false, overlap: false });
     map.photons()[0]
 }

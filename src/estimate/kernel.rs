@@ -45,9 +45,11 @@ impl Kernel {
 
     /// Value at the squared relative distance `u`; 0 for `u > 1`.
     pub fn value(self, u: f64) -> f64 {
-        if u > 1.0 {
+        // The photon that sets the radius lies on the rim, up to rounding.
+        if u > 1.0 + 1e-5 {
             return 0.0;
         }
+        let u = u.min(1.0);
         match self {
             Self::None => 1.0,
             Self::Cone => 3.0 * (1.0 - u.sqrt()),

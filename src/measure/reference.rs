@@ -45,6 +45,10 @@ impl Reference {
                 .decode()
                 .map_err(|e| format!("{}: {e}", path.display()))
         };
+        let is_exr = reference.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr"));
+        if !is_exr {
+            return Err(format!("{}: a reference must hold linear radiance; give an EXR", reference.display()));
+        }
         let image = linear(&open(reference)?);
         let mask = match mask {
             Some(path) => mask_of(&open(path)?),

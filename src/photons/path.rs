@@ -94,8 +94,8 @@ impl SpecularBounds {
         let to = self.center - origin;
         let along = to.dot(direction);
         let off = to - direction * along;
-        off.length_squared() <= self.radius * self.radius
-            && (along >= 0.0 || to.length_squared() <= self.radius * self.radius)
+        let reach = self.radius + 1e-6 * to.length();
+        off.length_squared() <= reach * reach && (along >= 0.0 || to.length_squared() <= reach * reach)
     }
 }
 
@@ -118,6 +118,7 @@ impl Flight<'_> {
         let mut d = emission.differential;
         let mut power = power;
         let mut kind = PhotonKind::Direct;
+        let mut medium = None;
         counts.grazing += u64::from(emission.bounded);
         for bounce in 0..self.settings.max_depth {
             let Some(hit) = self.intersector.closest(&ray) else {
@@ -130,6 +131,13 @@ impl Flight<'_> {
                 counts.differentials += u64::from(d.bound(scene.radius, MAX_ANGLE));
             }
             let x = self.sequence.four(index, 1 + bounce);
+            medium = medium_before(scene, medium, &surface);
+            if let Some(inside) = attenuation(scene, medium, hit.t) {
+                match roulette(power, inside, x[1]) {
+                    Some(kept) => power = kept,
+                    None => return,
+                }
+            }
             let material = &scene.materials[surface.material as usize];
             match material {
                 Material::Emitter { .. } => return,
@@ -162,13 +170,17 @@ impl Flight<'_> {
                     ray = Ray { origin: surface.leave(scene, w), direction: w };
                 }
                 _ => {
-                    let Some((next, kept, beyond)) = self.specular(material, &surface, &ray, hit.t, power, &mut d, x)
+                    let Some((next, kept, beyond, through)) =
+                        self.specular(material, &surface, &ray, power, &mut d, x[0])
                     else {
                         return;
                     };
                     power = kept;
                     ray = next;
                     counts.horizon += u64::from(beyond);
+                    if through {
+                        medium = medium_behind(&surface);
+                    }
                     if kind == PhotonKind::Direct {
                         kind = PhotonKind::Caustic;
                     }
@@ -186,28 +198,24 @@ impl Flight<'_> {
         }
     }
 
-    /// One specular event by roulette: the next ray, the power it keeps, whether its normal was mended.
-    #[expect(clippy::too_many_arguments, reason = "the state of a path, spelled out")]
+    /// One specular event by roulette on `x`: the next ray, the power it keeps, whether its normal was mended, and
+    /// whether it went through.
     fn specular(
         &self,
         material: &Material,
         surface: &Surface,
         ray: &Ray,
-        distance: f32,
         power: Rgb,
         d: &mut Differential,
-        x: [f32; 4],
-    ) -> Option<(Ray, Rgb, bool)> {
+        x: f32,
+    ) -> Option<(Ray, Rgb, bool, bool)> {
         let weights = specular_weights(material, surface, ray.direction)?;
-        let mut power = power;
-        if let Some(inside) = attenuation(material, surface, distance) {
-            power = roulette(power, inside, x[2])?;
-        }
         let reflect = share(power, weights.reflected);
         let refract = share(power, weights.refracted);
-        let (next, weight, q) = if x[0] < reflect {
+        let through = x >= reflect;
+        let (next, weight, q) = if !through {
             (reflected(self.scene, surface, ray.direction, d), weights.reflected, reflect)
-        } else if x[0] < reflect + refract {
+        } else if x < reflect + refract {
             (refracted(self.scene, surface, ray.direction, d, weights.eta), weights.refracted, refract)
         } else {
             return None;
@@ -216,14 +224,26 @@ impl Flight<'_> {
             *d = next.differential;
         }
         let ray = Ray { origin: surface.leave(self.scene, next.direction), direction: next.direction };
-        Some((ray, power * weight / q, next.beyond_horizon))
+        Some((ray, power * weight / q, next.beyond_horizon, through))
     }
 }
 
-/// Transmittance of the way just travelled, if it lay inside a dielectric that absorbs.
-pub fn attenuation(material: &Material, surface: &Surface, distance: f32) -> Option<Rgb> {
-    match material {
-        Material::Dielectric { transmittance, .. } if !surface.front && *transmittance != Rgb::ONE => {
+/// The dielectric in which the way to `surface` lay: `medium`, in which the path knows itself, or the one whose inside
+/// it meets although it never entered, because it started there.
+pub fn medium_before(scene: &Scene, medium: Option<u32>, surface: &Surface) -> Option<u32> {
+    let is_inside = !surface.front && matches!(scene.materials[surface.material as usize], Material::Dielectric { .. });
+    medium.or(is_inside.then_some(surface.material))
+}
+
+/// The dielectric behind `surface` for a path that goes through it.
+pub fn medium_behind(surface: &Surface) -> Option<u32> {
+    surface.front.then_some(surface.material)
+}
+
+/// Transmittance of a way of `distance` metres in `medium`, if that absorbs.
+pub fn attenuation(scene: &Scene, medium: Option<u32>, distance: f32) -> Option<Rgb> {
+    match scene.materials.get(medium? as usize) {
+        Some(Material::Dielectric { transmittance, .. }) if *transmittance != Rgb::ONE => {
             Some(Rgb::from_array(transmittance.to_array().map(|t| pow(t, distance))))
         }
         _ => None,

@@ -1,7 +1,7 @@
 //! Direct light by shadow rays.
 
 use crate::math::elementary::pow;
-use crate::math::frame::direction;
+use crate::math::frame::tangents;
 use crate::math::rgb::Rgb;
 use crate::math::sequence::Sequence;
 use crate::photons::emission::sample_triangles;
@@ -9,10 +9,11 @@ use crate::scene::{Light, Scene};
 use crate::trace::surface::SELF_INTERSECTION;
 use crate::trace::{Intersector, Ray};
 use glam::Vec3;
-use std::f32::consts::{PI, TAU};
+use std::f32::consts::PI;
 
-/// Part of the way to a light's surface that a shadow ray covers, so that it does not meet the light itself.
-const SHORT_OF_LIGHT: f32 = 1.0 - 1e-4;
+/// How far before a light's own surface a shadow ray ends, in units of the offset at its start and of its length:
+/// enough that it does not meet the light itself, however near or flat that is.
+const SHORT_OF_LIGHT: (f32, f32) = (4.0, 1e-5);
 
 /// Dimension set of a light's shadow rays; sets below belong to the view path.
 const LIGHT_SETS: u32 = 1024;
@@ -44,12 +45,10 @@ pub fn irradiance(
         let mut own = Rgb::ZERO;
         for ray in 0..count {
             let x = sequence.four(index * u64::from(count) + u64::from(ray), LIGHT_SETS + i as u32);
-            if let Some(sample) = sample(light, receiver, scene.radius, x[0], x[1]) {
-                let origin = receiver.position + receiver.normal * (scene.radius * SELF_INTERSECTION);
-                let towards = Ray { origin, direction: sample.direction };
-                if !intersector.any(&towards, sample.distance) {
-                    own += sample.irradiance;
-                }
+            if let Some(sample) = sample(light, receiver, scene.radius, x[0], x[1])
+                && !blocked(scene, intersector, receiver, &sample)
+            {
+                own += sample.irradiance;
             }
         }
         sum += own / count as f32;
@@ -59,10 +58,23 @@ pub fn irradiance(
 
 /// Light from one place, if nothing stands in the way.
 struct LightSample {
-    direction: Vec3,
-    /// Free way that is needed, metres.
-    distance: f32,
+    /// From the receiver to that place, metres.
+    offset: Vec3,
     irradiance: Rgb,
+}
+
+/// Whether something stands between the receiver, lifted off its surface, and a place of a light.
+fn blocked(scene: &Scene, intersector: &Intersector, receiver: &Receiver, sample: &LightSample) -> bool {
+    let lift = scene.radius * SELF_INTERSECTION;
+    let way = sample.offset - receiver.normal * lift;
+    let length = way.length();
+    if length.is_nan() || length <= 0.0 {
+        return false;
+    }
+    let ray = Ray { origin: receiver.position + receiver.normal * lift, direction: way / length };
+    // A light lower over the surface than its ray is lifted is as good as touched.
+    let short = (SHORT_OF_LIGHT.0 * lift).min(length / 2.0) + SHORT_OF_LIGHT.1 * length;
+    intersector.any(&ray, length - short)
 }
 
 fn sample(light: &Light, r: &Receiver, scene_radius: f32, u: f32, v: f32) -> Option<LightSample> {
@@ -83,13 +95,10 @@ fn sample(light: &Light, r: &Receiver, scene_radius: f32, u: f32, v: f32) -> Opt
         }
         Light::Directional { direction, irradiance, .. } => {
             let cos = -direction.dot(r.normal);
-            (cos > 0.0).then(|| LightSample {
-                direction: -*direction,
-                distance: 4.0 * scene_radius,
-                irradiance: *irradiance * cos,
-            })
+            (cos > 0.0)
+                .then(|| LightSample { offset: -*direction * (4.0 * scene_radius), irradiance: *irradiance * cos })
         }
-        Light::Sphere { center, radius, .. } => sphere(r, *center, *radius, light.radiance(), u, v),
+        Light::Sphere { center, radius, power } => sphere(r, *center, *radius, *power, u, v),
         Light::Quad { center, u: eu, v: ev, .. } => {
             let position = *center + *eu * (2.0 * u - 1.0) + *ev * (2.0 * v - 1.0);
             let n = eu.cross(*ev);
@@ -112,11 +121,7 @@ fn towards(r: &Receiver, position: Vec3, intensity: impl Fn(Vec3) -> Rgb) -> Opt
         return None;
     }
     let intensity = intensity(w);
-    (intensity != Rgb::ZERO).then(|| LightSample {
-        direction: w,
-        distance: distance * SHORT_OF_LIGHT,
-        irradiance: intensity * (cos / (distance * distance)),
-    })
+    (intensity != Rgb::ZERO).then(|| LightSample { offset, irradiance: intensity * (cos / (distance * distance)) })
 }
 
 /// One point of a surface that stands for all of it; `radiance_area` is radiance times area.
@@ -125,31 +130,34 @@ fn from_surface(r: &Receiver, position: Vec3, n: Vec3, radiance_area: Rgb) -> Op
     (facing > 0.0).then(|| towards(r, position, |_| radiance_area * facing)).flatten()
 }
 
-/// A direction within the cone that a sphere fills, uniform over solid angle.
-fn sphere(r: &Receiver, center: Vec3, radius: f32, radiance: Rgb, u: f32, v: f32) -> Option<LightSample> {
-    let offset = center - r.position;
-    let d2 = offset.length_squared();
-    let sin2 = radius * radius / d2;
+/// A direction within the cone that a sphere fills, uniform over solid angle. In f64, and without the sphere's area,
+/// so that a tiny or far sphere lights like a point.
+fn sphere(r: &Receiver, center: Vec3, radius: f32, power: Rgb, u: f32, v: f32) -> Option<LightSample> {
+    let towards = (center - r.position).as_dvec3();
+    let d2 = towards.length_squared();
+    let r2 = f64::from(radius) * f64::from(radius);
+    let sin2 = r2 / d2;
     // Inside the sphere, or at no distance that can be told.
     if sin2 >= 1.0 || sin2.is_nan() {
         return None;
     }
     // 1 - cos without cancellation.
     let rest = sin2 / (1.0 + (1.0 - sin2).sqrt());
-    let solid_angle = TAU * rest;
-    let away = rest * u;
-    let w = direction(offset / d2.sqrt(), 1.0 - away, TAU * v);
-    let cos = w.dot(r.normal);
-    if cos <= 0.0 {
+    let away = rest * f64::from(u);
+    let (cos, sin) = (1.0 - away, (away * (2.0 - away)).max(0.0).sqrt());
+    let axis = towards / d2.sqrt();
+    let (t, b) = tangents(axis.as_vec3());
+    let (s, c) = libm::sincos(std::f64::consts::TAU * f64::from(v));
+    let w = axis * cos + (t.as_dvec3() * c + b.as_dvec3() * s) * sin;
+    let lit = w.dot(r.normal.as_dvec3());
+    if lit <= 0.0 {
         return None;
     }
-    let along = offset.dot(w);
-    let half = (radius * radius - (d2 - along * along)).max(0.0).sqrt();
-    Some(LightSample {
-        direction: w,
-        distance: (along - half) * SHORT_OF_LIGHT,
-        irradiance: radiance * (solid_angle * cos),
-    })
+    // The near side of the sphere: |w t - towards|² = r².
+    let distance = d2.sqrt() * cos - (r2 - d2 * sin * sin).max(0.0).sqrt();
+    // L Ω cos θ = Φ/(4π² r²) · 2π (1 - cos θ_max) cos θ.
+    let scale = lit / (2.0 * std::f64::consts::PI * d2 * (1.0 + (1.0 - sin2).sqrt()));
+    Some(LightSample { offset: (w * distance).as_vec3(), irradiance: (power.as_dvec3() * scale).as_vec3() })
 }
 
 #[cfg(test)]
@@ -157,6 +165,7 @@ mod tests {
     use super::*;
     use crate::math::sequence::Sampling;
     use crate::scene::{built_in, source::open_built_in};
+    use std::f32::consts::TAU;
 
     fn lit_by(light: Light, position: Vec3, rays: u32) -> f32 {
         let b = built_in::find("plane").expect("built in");

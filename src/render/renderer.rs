@@ -18,7 +18,12 @@ pub const ALPHA: f64 = 2.0 / 3.0;
 
 /// Area of the footprints of pass `pass` (from 0) relative to the first: `∏ (i + α)/(i + 1)`.
 pub fn area_factor(pass: u32) -> f64 {
-    (1..=pass).fold(1.0, |area, i| area * (f64::from(i) + ALPHA) / (f64::from(i) + 1.0))
+    (1..=pass).fold(1.0, next_area)
+}
+
+/// Area of the footprints of pass `pass` (from 1) after `area` in the pass before.
+fn next_area(area: f64, pass: u32) -> f64 {
+    area * (f64::from(pass) + ALPHA) / (f64::from(pass) + 1.0)
 }
 
 /// What callers are asked and told while a pass runs, from any thread.
@@ -144,8 +149,7 @@ impl Renderer {
         }
         self.films.iter_mut().for_each(Film::finish_pass);
         self.last = Some((photons, maps));
-        let i = f64::from(pass + 1);
-        self.area *= (i + ALPHA) / (i + 1.0);
+        self.area = next_area(self.area, pass + 1);
         Step::Done
     }
 

@@ -4,7 +4,7 @@ use crate::estimate::View;
 use crate::math::rgb::{Rgb, mean};
 use crate::math::sequence::Sequence;
 use crate::photons::map::Query;
-use crate::photons::path::{MAX_ANGLE, PathCounts, attenuation};
+use crate::photons::path::{MAX_ANGLE, PathCounts, attenuation, medium_before, medium_behind};
 use crate::render::direct::{self, Receiver};
 use crate::render::plan::Plan;
 use crate::render::settings::RenderSettings;
@@ -53,6 +53,8 @@ pub struct Branch {
     ray: Ray,
     differential: Differential,
     throughput: Rgb,
+    /// The dielectric that it is in.
+    medium: Option<u32>,
     depth: u32,
     specular: u32,
 }
@@ -75,7 +77,7 @@ impl ViewTracer<'_> {
     ) -> Rgb {
         let mut radiance = Rgb::ZERO;
         stack.clear();
-        stack.push(Branch { ray, differential, throughput: Rgb::ONE, depth: 0, specular: 0 });
+        stack.push(Branch { ray, differential, throughput: Rgb::ONE, medium: None, depth: 0, specular: 0 });
         while let Some(mut branch) = stack.pop() {
             let Some(hit) = self.intersector.closest(&branch.ray) else {
                 continue;
@@ -86,6 +88,10 @@ impl ViewTracer<'_> {
                 branch.differential = branch.differential.transfer(v, surface.normal, hit.t);
                 let bounded = branch.differential.bound(self.scene.radius, MAX_ANGLE);
                 counts.bounded.differentials += u64::from(bounded);
+            }
+            branch.medium = medium_before(self.scene, branch.medium, &surface);
+            if let Some(inside) = attenuation(self.scene, branch.medium, hit.t) {
+                branch.throughput *= inside;
             }
             let material = &self.scene.materials[surface.material as usize];
             match material {
@@ -127,7 +133,7 @@ impl ViewTracer<'_> {
                     if !surface.front && branch.depth == 0 && matches!(material, Material::Dielectric { .. }) {
                         counts.camera_inside_glass += 1;
                     }
-                    self.scatter(material, &surface, hit.t, branch, sequence, index, stack, counts);
+                    self.scatter(material, &surface, branch, sequence, index, stack, counts);
                 }
             }
         }
@@ -140,7 +146,6 @@ impl ViewTracer<'_> {
         &self,
         material: &Material,
         surface: &Surface,
-        distance: f32,
         branch: Branch,
         sequence: &Sequence,
         index: u64,
@@ -155,18 +160,17 @@ impl ViewTracer<'_> {
             counts.bounded.depth += 1;
             return;
         }
-        let throughput = match attenuation(material, surface, distance) {
-            Some(inside) => branch.throughput * inside,
-            None => branch.throughput,
-        };
-        let mut follow = |next: SpecularRay, weight: Rgb| {
+        // Radiance changes with the square of the index, so that L/n² is the same on both sides (a view ray runs backwards).
+        let bend = weights.eta * weights.eta;
+        let mut follow = |next: SpecularRay, weight: Rgb, medium: Option<u32>| {
             counts.bounded.horizon += u64::from(next.beyond_horizon);
-            let throughput = throughput * weight;
+            let throughput = branch.throughput * weight;
             if throughput != Rgb::ZERO {
                 stack.push(Branch {
                     ray: Ray { origin: surface.leave(self.scene, next.direction), direction: next.direction },
                     differential: next.differential,
                     throughput,
+                    medium,
                     depth: branch.depth + 1,
                     specular: branch.specular + 1,
                 });
@@ -179,17 +183,17 @@ impl ViewTracer<'_> {
         if r > 0.0 && t > 0.0 && branch.specular >= self.settings.split_depth {
             let chance = r / (r + t);
             if sequence.four(index, 1 + branch.depth)[0] < chance {
-                follow(reflect(d), weights.reflected / chance);
+                follow(reflect(d), weights.reflected / chance, branch.medium);
             } else {
-                follow(refract(d), weights.refracted / (1.0 - chance));
+                follow(refract(d), weights.refracted * (bend / (1.0 - chance)), medium_behind(surface));
             }
             return;
         }
         if t > 0.0 {
-            follow(refract(d), weights.refracted);
+            follow(refract(d), weights.refracted * bend, medium_behind(surface));
         }
         if r > 0.0 {
-            follow(reflect(d), weights.reflected);
+            follow(reflect(d), weights.reflected, branch.medium);
         }
     }
 }

@@ -38,18 +38,28 @@ const MAX_FAN: usize = 256;
 /// # Errors
 /// A line with a number that is none or not finite, an index out of range, or anything `tobj` refuses.
 pub fn read(path: &Path, text: &str, crease_angle: f64) -> Result<ObjFile, ObjError> {
+    let text = &without_comments(text);
     check_lines(text)?;
     let whole = |what: String| ObjError { line: 0, what };
     let options = tobj::LoadOptions { triangulate: true, ignore_points: true, ignore_lines: true, single_index: false };
     let folder = path.parent().unwrap_or(Path::new("")).to_owned();
+    let bad_material = std::cell::RefCell::new(None);
     let material_text = std::cell::RefCell::new(String::new());
     let (models, materials) = tobj::load_obj_buf(&mut text.as_bytes(), &options, |name| {
         let read = std::fs::read_to_string(folder.join(name)).map_err(|_| tobj::LoadError::OpenFileFailed)?;
+        let read = without_comments(&read);
         material_text.borrow_mut().push_str(&read);
+        check_materials(&read).map_err(|line| {
+            bad_material.borrow_mut().get_or_insert((name.to_owned(), line));
+            tobj::LoadError::MaterialParseError
+        })?;
         tobj::load_mtl_buf(&mut read.as_bytes())
     })
     .map_err(|e| whole(format!("cannot be read as OBJ: {e}")))?;
 
+    if let Some((file, line)) = bad_material.into_inner() {
+        return Err(whole(format!("{}:{line}: wants finite numbers; is the file cut off?", file.display())));
+    }
     let mut warnings = Vec::new();
     let materials = materials.unwrap_or_else(|e| {
         warnings.push(format!("{}: its material file: {e}", path.display()));
@@ -69,6 +79,34 @@ pub fn read(path: &Path, text: &str, crease_angle: f64) -> Result<ObjFile, ObjEr
         material_text: material_text.into_inner(),
         warnings,
     })
+}
+
+/// The text with all from `#` on cut off each line; lines keep their numbers.
+fn without_comments(text: &str) -> String {
+    text.lines().map(|l| l.split('#').next().unwrap_or("")).flat_map(|l| [l, "\n"]).collect()
+}
+
+/// Line (from 1) of a material file whose numbers are missing or not finite.
+fn check_materials(text: &str) -> Result<(), usize> {
+    for (index, line) in text.lines().enumerate() {
+        let mut words = line.split_whitespace();
+        let wanted = match words.next() {
+            Some("Ka" | "Kd" | "Ks" | "Ke" | "Tf") => 3,
+            Some("Ns" | "Ni" | "d" | "Tr" | "illum") => 1,
+            Some("newmtl" | "map_Kd" | "map_Ka" | "map_Ks" | "map_Ns" | "map_d" | "map_Bump" | "bump") => {
+                if words.next().is_none() {
+                    return Err(index + 1);
+                }
+                continue;
+            }
+            _ => continue,
+        };
+        let numbers = words.take(wanted).filter(|w| w.parse::<f64>().is_ok_and(f64::is_finite)).count();
+        if numbers < wanted {
+            return Err(index + 1);
+        }
+    }
+    Ok(())
 }
 
 /// Finds the first line whose numbers are no numbers, or whose indices point nowhere.
@@ -236,6 +274,19 @@ mod tests {
             let text = format!("v 0 0 0\nv 1 0 0\nv 1 1 0\nv {x} 0 {z}\nf 1 2 3\nf 2 4 3\n");
             let obj = read_text(&text).map_err(|e| e.what).expect("reads");
             assert_eq!(obj.mesh.corner_normals[0][0] != NONE, smooth, "{z}");
+        }
+    }
+
+    #[test]
+    fn broken_material_files_are_named() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let obj = "mtllib m.mtl\nv 0 0 0 # origin\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+        for (mtl, line) in
+            [("newmtl q\nKd 0.5 0.5\n", 2), ("newmtl q\nKe 1 1", 2), ("newmtl\n", 1), ("newmtl q\nNi nan\n", 2)]
+        {
+            std::fs::write(folder.path().join("m.mtl"), mtl).expect("writes");
+            let error = read(&folder.path().join("t.obj"), obj, CREASE_ANGLE).err().expect(mtl);
+            assert!(error.what.starts_with(&format!("m.mtl:{line}: ")), "{}", error.what);
         }
     }
 
