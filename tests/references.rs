@@ -3,13 +3,14 @@
 #![allow(clippy::expect_used, missing_docs, reason = "a failed expectation is how this program reports")]
 
 use cusp::estimate::registry::estimator;
-use cusp::measure::Reference;
 use cusp::measure::metrics::{block_average, compare, region_mean};
+use cusp::measure::{Mask, Reference};
 use cusp::render::film::Image;
 use cusp::render::renderer::Watch;
 use cusp::render::{RenderSettings, Renderer};
 use cusp::scene::open;
 use cusp::scene::scene_file::RenderFile;
+use glam::{DVec3, Vec3};
 
 fn flags(photons: i64) -> RenderFile {
     RenderFile { photons: Some(photons), shadow_rays: Some(1), ..Default::default() }
@@ -28,26 +29,41 @@ fn render(name: &str, passes: u32, flags: &RenderFile) -> Image {
     renderer.films()[0].image()
 }
 
-/// Checks the mean of each region within 1 %, and the relative RMSE of 4×4 blocks.
-fn check(name: &str, image: &Image, regions: &[([u32; 4], [f32; 3])], limit: f64) {
+/// A rectangle, what the reference's maker measured in it, and how much of that may be the reference's own noise.
+type Region = ([u32; 4], [f32; 3], f32);
+
+/// Mean over the pixels of a rectangle that count.
+fn masked_mean(image: &Image, mask: &Mask, [x0, y0, x1, y1]: [u32; 4]) -> Vec3 {
+    let inside = (y0..y1).flat_map(|y| (x0..x1).map(move |x| (x, y)));
+    let counted = inside.filter(|(x, y)| mask.counts[(y * mask.size[0] + x) as usize]);
+    let (sum, n) = counted.fold((DVec3::ZERO, 0.0), |(sum, n), (x, y)| (sum + image.at(x, y).as_dvec3(), n + 1.0));
+    (sum / n).as_vec3()
+}
+
+/// Checks the mean of each region within 1 % beside the reference's own noise, and the relative RMSE of 4×4 blocks.
+fn check(name: &str, image: &Image, regions: &[Region], limit: f64) {
     let reference = Reference::built_in(name).expect("decodes").expect("stored");
     let (small, mask) = block_average(image, &reference.mask, 4);
     let (small_reference, _) = block_average(&reference.image, &reference.mask, 4);
     let error = compare(&small, &small_reference, &mask).expect("same size");
-    println!("relative RMSE {:.3} %, mean ratio {:.4}", 100.0 * error.relative_rmse, error.mean_ratio);
-    let means = regions.iter().map(|(rect, expected)| (rect, region_mean(image, *rect), expected));
-    for (rect, mean, expected) in means.clone() {
-        println!("  {rect:?}: {mean} against {expected:?}, {:+.2} %", 100.0 * (mean.x / expected[0] - 1.0));
-    }
-    for (rect, mean, expected) in means {
-        for (x, e) in mean.to_array().iter().zip(expected) {
-            assert!((x - e).abs() <= 0.01 * e, "{name} {rect:?}: {mean} is not {expected:?}");
+    println!("{name}: relative RMSE {:.3} %, mean ratio {:.4}", 100.0 * error.relative_rmse, error.mean_ratio);
+    let mut wrong = Vec::new();
+    for (rect, measured, noise) in regions {
+        let whole = region_mean(&reference.image, *rect);
+        assert!((whole - Vec3::from(*measured)).abs().max_element() < 1e-4, "{rect:?} is the region that was measured");
+        let (mean, expected) =
+            (masked_mean(image, &reference.mask, *rect), masked_mean(&reference.image, &reference.mask, *rect));
+        let off = (mean - expected) / expected.max(Vec3::splat(1e-6));
+        println!("  {rect:?}: {mean} against {expected}, {:+.2} %", 100.0 * off.x);
+        if off.abs().max_element() > 0.01 + noise {
+            wrong.push(rect);
         }
     }
+    assert!(wrong.is_empty(), "{name}: regions {wrong:?}");
     assert!(error.relative_rmse <= limit, "{name}: {}", error.relative_rmse);
 }
 
-fn agrees(name: &str, passes: u32, photons: i64, regions: &[([u32; 4], [f32; 3])], limit: f64) {
+fn agrees(name: &str, passes: u32, photons: i64, regions: &[Region], limit: f64) {
     check(name, &render(name, passes, &flags(photons)), regions, limit);
 }
 
@@ -58,35 +74,42 @@ fn grey(value: f32) -> [f32; 3] {
 #[test]
 fn ring() {
     let regions = [
-        ([20, 20, 60, 60], grey(0.19116)),
-        ([150, 138, 166, 150], grey(0.36305)),
-        ([100, 120, 140, 150], grey(0.12868)),
-        ([15, 120, 40, 170], grey(0.28678)),
-        ([200, 170, 250, 220], grey(0.0)),
+        ([20, 20, 60, 60], grey(0.19116), 0.0),
+        ([150, 138, 166, 150], grey(0.36305), 0.0),
+        ([100, 120, 140, 150], grey(0.12868), 0.0),
+        ([15, 120, 40, 170], grey(0.28678), 0.0),
+        ([200, 170, 250, 220], grey(0.0), 0.0),
     ];
     agrees("ring", 40, 400_000, &regions, 0.03);
 }
 
 #[test]
 fn ring_soft() {
-    let regions =
-        [([20, 20, 60, 60], grey(0.19118)), ([140, 100, 200, 150], grey(0.16876)), ([90, 75, 190, 95], grey(0.07099))];
+    let regions = [
+        ([20, 20, 60, 60], grey(0.19118), 0.0),
+        ([140, 100, 200, 150], grey(0.16876), 0.0),
+        ([90, 75, 190, 95], grey(0.07099), 0.0),
+    ];
     agrees("ring_soft", 40, 400_000, &regions, 0.06);
 }
 
+/// Twice the noise of the reference in the glass ball's stray light. It was made of 32,768 · 256² photons of 80 W; a
+/// pixel of 8e-5 m² under π/0.8 · 0.0054 W/m² of caustic light got some 45 of them, the region of 750 pixels some 34,000.
+const STRAY_NOISE: f32 = 2.0 * 0.0054;
+
 /// The focus holds an eighth of the light on a few pixels, and the region of stray light very little: caustic photons
-/// are followed alone, a thousand million of them, and the three parts of the light added up.
+/// are followed alone, some hundred million of them, and the three parts of the light added up.
 #[test]
 fn glass_ball() {
     let regions = [
-        ([20, 150, 70, 230], grey(0.11126)),
-        ([104, 123, 120, 130], grey(2.05469)),
-        ([70, 110, 95, 140], grey(0.00882)),
+        ([20, 150, 70, 230], grey(0.11126), 0.0),
+        ([104, 123, 120, 130], grey(2.05469), 0.0),
+        ([70, 110, 95, 140], grey(0.00882), STRAY_NOISE),
     ];
-    let parts = [("direct", 1), ("caustic", 20_000_000), ("global", 2_500_000)];
+    let parts = [("direct", 1), ("caustic", 10_000_000), ("global", 1_000_000)];
     let images = parts.map(|(light, photons)| {
         let flags = RenderFile { light: Some(light.into()), ..flags(photons) };
-        render("glass_ball", 50, &flags)
+        render("glass_ball", 48, &flags)
     });
     let mut sum = images[0].clone();
     for part in &images[1..] {
@@ -98,11 +121,11 @@ fn glass_ball() {
 #[test]
 fn cornell() {
     let regions = [
-        ([90, 100, 130, 200], [0.23759, 0.22457, 0.20645]),
-        ([60, 235, 200, 250], [0.21411, 0.18417, 0.17657]),
-        ([20, 60, 45, 180], [0.41913, 0.02955, 0.02815]),
-        ([215, 60, 240, 180], [0.08551, 0.30774, 0.09757]),
-        ([145, 60, 200, 100], [0.36333, 0.39188, 0.33829]),
+        ([90, 100, 130, 200], [0.23759, 0.22457, 0.20645], 0.0),
+        ([60, 235, 200, 250], [0.21411, 0.18417, 0.17657], 0.0),
+        ([20, 60, 45, 180], [0.41913, 0.02955, 0.02815], 0.0),
+        ([215, 60, 240, 180], [0.08551, 0.30774, 0.09757], 0.0),
+        ([145, 60, 200, 100], [0.36333, 0.39188, 0.33829], 0.0),
     ];
     agrees("cornell", 30, 200_000, &regions, 0.03);
 }
