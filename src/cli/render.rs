@@ -68,10 +68,8 @@ pub fn run(args: &RenderArgs) -> Result<(), Failure> {
         }
         let image = renderer.films()[0].image();
         let provenance = Provenance::new(renderer.scene(), renderer.settings().seed);
-        let path = match &args.flags.out {
-            Some(folder) => folder.join(&args.output),
-            None => args.output.clone(),
-        };
+        let placed = |file: &PathBuf| args.flags.out.as_ref().map_or(file.clone(), |folder| folder.join(file));
+        let path = placed(&args.output);
         if is_png {
             png_file::write(&path, image.size, &to_srgb(&image, auto_exposure(&image)), &provenance)?;
         } else {
@@ -79,7 +77,7 @@ pub fn run(args: &RenderArgs) -> Result<(), Failure> {
         }
         let report = RenderReport::new(&renderer, name, load, start.elapsed().as_secs_f64());
         if let Some(stats) = &args.stats {
-            whole_file::write(stats, to_json(&report)?.as_bytes())?;
+            whole_file::write(&placed(stats), to_json(&report)?.as_bytes())?;
         }
         if args.flags.json {
             print(&to_json(&report)?)?;

@@ -93,13 +93,17 @@ pub struct ViewResult {
     pub complete: bool,
 }
 
+/// Photons that are gathered before they are estimated; a hit's own may exceed it.
+const BATCH: usize = 1 << 20;
+
 /// Buffers that a thread keeps from tile to tile.
 #[derive(Default)]
 struct Scratch {
     hits: Vec<ViewHit>,
     stack: Vec<Branch>,
     indices: Vec<u32>,
-    spans: Vec<(u32, u32, f32)>,
+    /// For each hit and map: where its indices start and end, and the radius of its disc.
+    spans: Vec<(usize, usize, f32)>,
     heap: Nearest,
 }
 
@@ -193,9 +197,10 @@ impl ViewPass<'_> {
             let x = rect.x + pixel as u32 % rect.width;
             let y = rect.y + pixel as u32 / rect.width;
             let seed = mix(mix(t.settings.seed, 0x76_6965_7773), u64::from(y) << 32 | u64::from(x));
-            let sequence = Sequence::new(Sampling::Sobol, seed);
+            let index = u64::from(self.pass);
             for cell in 0..n * n {
-                let index = u64::from(self.pass) * u64::from(n * n) + u64::from(cell);
+                // Each ray of a pixel has a sequence of its own, whose points follow each other from pass to pass.
+                let sequence = Sequence::new(Sampling::Sobol, mix(seed, u64::from(cell)));
                 let jitter = (self.pass > 0).then(|| {
                     let x = sequence.four(index, 0);
                     [((x[0] * cells).floor() + 0.5) / cells, ((x[1] * cells).floor() + 0.5) / cells]
@@ -218,40 +223,44 @@ impl ViewPass<'_> {
         base
     }
 
-    /// Gathers for all hits of the scratch, then estimates, each timed as a whole.
+    /// Gathers and estimates for the scratch's hits in batches, each part of a batch timed as a whole. A tile is one
+    /// batch unless photons overlap by the thousand, so that memory stays bounded.
     fn estimate(&self, base: &[Rgb], n: u32, slot: &Slot, scratch: &mut Scratch) -> TileImage {
-        let start = Instant::now();
-        scratch.indices.clear();
-        scratch.spans.clear();
-        for hit in 0..scratch.hits.len() {
-            for map in self.maps.all() {
-                let first = scratch.indices.len() as u32;
-                let radius = self.gather(map, slot, hit, scratch);
-                scratch.spans.push((first, scratch.indices.len() as u32, radius));
-            }
-        }
-        let gather = start.elapsed().as_secs_f64();
-
-        let start = Instant::now();
         let mut sums: Vec<DVec3> = base.iter().map(|b| b.as_dvec3()).collect();
-        let mut spans = scratch.spans.iter();
-        for hit in &scratch.hits {
-            let mut irradiance = Rgb::ZERO;
-            for (map, &(from, to, radius)) in self.maps.all().zip(spans.by_ref()) {
-                let gathered =
-                    Gathered { photons: map.photons(), indices: &scratch.indices[from as usize..to as usize], radius };
-                irradiance += slot.estimator.irradiance(&gathered, &hit.view);
+        let mut seconds = PartSeconds::default();
+        let mut gathered = 0;
+        let mut next = 0;
+        while next < scratch.hits.len() {
+            let start = Instant::now();
+            let first = next;
+            scratch.indices.clear();
+            scratch.spans.clear();
+            while next < scratch.hits.len() && scratch.indices.len() < BATCH {
+                for map in self.maps.all() {
+                    let from = scratch.indices.len();
+                    let radius = self.gather(map, slot, next, scratch);
+                    scratch.spans.push((from, scratch.indices.len(), radius));
+                }
+                next += 1;
             }
-            sums[hit.pixel as usize] += (irradiance * hit.weight).as_dvec3();
+            seconds.gather += start.elapsed().as_secs_f64();
+            gathered += scratch.indices.len() as u64;
+
+            let start = Instant::now();
+            let mut spans = scratch.spans.iter();
+            for hit in &scratch.hits[first..next] {
+                let mut irradiance = Rgb::ZERO;
+                for (map, &(from, to, radius)) in self.maps.all().zip(spans.by_ref()) {
+                    let found = Gathered { photons: map.photons(), indices: &scratch.indices[from..to], radius };
+                    irradiance += slot.estimator.irradiance(&found, &hit.view);
+                }
+                sums[hit.pixel as usize] += irradiance.as_dvec3() * hit.weight.as_dvec3();
+            }
+            seconds.estimate += start.elapsed().as_secs_f64();
         }
         let scale = 1.0 / f64::from(n * n);
         let pixels = sums.into_iter().map(|s| finite(s * scale)).collect();
-        let estimate = start.elapsed().as_secs_f64();
-        TileImage {
-            pixels,
-            seconds: PartSeconds { view_trace: 0.0, gather, estimate },
-            gathered: scratch.indices.len() as u64,
-        }
+        TileImage { pixels, seconds, gathered }
     }
 
     /// Appends the photons of one hit to the scratch's indices; returns the radius of the disc, if it asks for one.
