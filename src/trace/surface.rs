@@ -171,4 +171,41 @@ mod tests {
             assert_eq!(dn[1], -dn[0]);
         }
     }
+
+    /// On a smooth triangle whose normals differ by more than a right angle: the error of dN against central
+    /// differences of the traced normal falls as h².
+    #[test]
+    fn normal_differential_converges_to_second_order_on_a_smooth_triangle() {
+        let b = built_in::find("plane").expect("built in");
+        let mut scene = open_built_in(b).expect("opens");
+        scene.geometry = Geometry {
+            positions: vec![Vec3::ZERO, Vec3::new(2.0, 0.0, 0.1), Vec3::new(0.3, 0.2, -1.7)],
+            normals: [Vec3::new(-0.9, 1.0, 0.3), Vec3::new(1.0, 0.8, 0.2), Vec3::new(0.1, 1.0, -0.9)]
+                .map(Vec3::normalize)
+                .into(),
+            triangles: vec![[0, 1, 2]],
+            corner_normals: vec![[0, 1, 2]],
+            corner_uvs: vec![[NONE; 3]],
+            triangle_materials: vec![0],
+            ..Default::default()
+        };
+        let intersector = Intersector::new(&scene.geometry, scene.radius);
+        let at = |x: f32, z: f32| {
+            let ray = Ray { origin: Vec3::new(x, 3.0, z), direction: Vec3::NEG_Y };
+            let hit = intersector.closest(&ray).expect("hits");
+            Surface::new(&scene, &ray, &hit)
+        };
+        let (x, z) = (0.75, -0.5);
+        let error = |h: f32, (dx, dz): (f32, f32)| {
+            let (p, m) = (at(x + h * dx, z + h * dz), at(x - h * dx, z - h * dz));
+            let dq = (p.position - m.position) / (2.0 * h);
+            let dn = at(x, z).normal_differential(&scene, [dq, dq])[0];
+            ((p.shading - m.shading) / (2.0 * h) - dn).length()
+        };
+        for along in [(1.0, 0.0), (0.0, 1.0), (0.6, 0.8)] {
+            let order = (error(0.16, along) / error(0.08, along)).log2();
+            assert!((1.8..2.2).contains(&order), "{along:?}: order {order}");
+            assert!(error(0.02, along) < 2e-3);
+        }
+    }
 }
