@@ -4,10 +4,10 @@ use crate::math::elementary::pow;
 use crate::math::rgb::luminance;
 use crate::render::film::Image;
 
-/// Part of the pixels that may be brighter than white.
-const CLIPPED: f64 = 0.005;
+/// Part of the pixels that may be brighter than white: a lamp in view should not darken what it lights.
+const CLIPPED: f64 = 0.02;
 
-/// Factor that brings the brightest pixels, but for the top half per cent, to white. 1 for a black image.
+/// Factor that brings the brightest pixels, but for the top two per cent, to white. 1 for a black image.
 ///
 /// The same factor serves all images that are compared; take it from one of them.
 pub fn auto_exposure(image: &Image) -> f32 {
