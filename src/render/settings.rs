@@ -100,7 +100,7 @@ pub struct SettingError {
 /// Largest number of photons in a pass; an index must fit a map.
 pub const MAX_PHOTONS: i64 = 1 << 31;
 /// Largest number of pixels across or down.
-pub const MAX_SIZE: u32 = 32_768;
+pub const MAX_SIZE: u32 = crate::scene::load::MAX_RESOLUTION as u32;
 /// Largest number of pixels.
 pub const MAX_PIXELS: u64 = 1 << 26;
 
