@@ -10,7 +10,7 @@ use cusp::math::sequence::{Sampling, Sequence};
 use cusp::photons::kd_tree::Nearest;
 use cusp::photons::map::{FootprintLimits, MapParts, Query};
 use cusp::photons::{Photon, PhotonMap};
-use cusp::render::renderer::Watch;
+use cusp::render::Silent;
 use cusp::render::{RenderSettings, Renderer};
 use cusp::scene::open;
 use cusp::scene::scene_file::RenderFile;
@@ -23,9 +23,9 @@ fn ring() -> (Vec<Photon>, Vec<View>) {
     let scene = open("ring").expect("built in");
     let flags = RenderFile { photons: Some(450_000), ..Default::default() };
     let settings = RenderSettings::new(&scene, &flags, Some([64, 64]), 1).expect("valid");
-    let mut renderer = Renderer::new(scene, settings, vec![estimator("integrated").expect("registered")]);
-    renderer.step(&Watch::SILENT);
-    let photons = renderer.last_pass().expect("one pass").0.stored.caustic.clone();
+    let mut renderer = Renderer::new(scene.into(), settings, vec![estimator("integrated").expect("registered")]);
+    renderer.step(&Silent);
+    let photons = renderer.last_pass().expect("one pass").photons.stored.caustic.clone();
     let views = (0..64)
         .flat_map(|i| (0..64).map(move |j| (i as f32 / 32.0 - 1.0, j as f32 / 32.0 - 1.0)))
         .map(|(x, z)| View {
@@ -129,10 +129,10 @@ fn tracing(c: &mut Criterion) {
         let scene = open(name).expect("built in");
         let flags = RenderFile { photons: Some(100_000), ..Default::default() };
         let settings = RenderSettings::new(&scene, &flags, Some([128, 128]), 1).expect("valid");
-        let renderer = Renderer::new(scene, settings, vec![estimator("integrated").expect("registered")]);
+        let renderer = Renderer::new(scene.into(), settings, vec![estimator("integrated").expect("registered")]);
         let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a pool");
         group.bench_function(BenchmarkId::new("100000_photons_one_thread", name), |b| {
-            b.iter(|| one.install(|| renderer.emitter(renderer.plan()).run(0, &|| false).emitted));
+            b.iter(|| one.install(|| renderer.emitter(renderer.plan(), renderer.settings()).run(0, &|| false).emitted));
         });
         let scene = renderer.scene();
         let sequence = Sequence::new(Sampling::Random, 2);

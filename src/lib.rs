@@ -15,3 +15,4 @@ pub mod trace;
 pub mod cli;
 pub mod export;
 pub mod measure;
+pub mod workbench;

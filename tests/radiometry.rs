@@ -4,8 +4,8 @@
 
 use cusp::estimate::registry::estimator;
 use cusp::math::rgb::Rgb;
+use cusp::render::Silent;
 use cusp::render::film::Image;
-use cusp::render::renderer::Watch;
 use cusp::render::{RenderSettings, Renderer};
 use cusp::scene::scene_file::RenderFile;
 use cusp::scene::{Camera, Light, Scene, open};
@@ -24,9 +24,9 @@ fn by_photons(lights: Vec<Light>, name: &str, photons: i64, passes: u32) -> (Ima
     };
     let settings = RenderSettings::new(&scene, &flags, Some([256, 256]), 3).expect("valid");
     let camera = scene.camera;
-    let mut renderer = Renderer::new(scene, settings, vec![estimator(name).expect("registered")]);
+    let mut renderer = Renderer::new(scene.into(), settings, vec![estimator(name).expect("registered")]);
     for _ in 0..passes {
-        renderer.step(&Watch::SILENT);
+        renderer.step(&Silent);
     }
     assert_eq!(renderer.stored().caustic + renderer.stored().global, 0);
     (renderer.films()[0].image(), camera)
@@ -140,9 +140,9 @@ fn load(body: &str) -> Scene {
 /// Mean radiance of the middle quarter of a 64×64 image.
 fn middle(scene: Scene, flags: &RenderFile, passes: u32) -> f32 {
     let settings = RenderSettings::new(&scene, flags, Some([64, 64]), 2).expect("valid");
-    let mut renderer = Renderer::new(scene, settings, vec![estimator("integrated").expect("registered")]);
+    let mut renderer = Renderer::new(scene.into(), settings, vec![estimator("integrated").expect("registered")]);
     for _ in 0..passes {
-        renderer.step(&Watch::SILENT);
+        renderer.step(&Silent);
     }
     cusp::measure::metrics::region_mean(&renderer.films()[0].image(), [16, 16, 48, 48]).x
 }
@@ -237,10 +237,10 @@ fn a_closed_box_gives_the_geometric_series() {
             ..Default::default()
         };
         let settings = RenderSettings::new(&scene, &flags, Some([8, 8]), 5).expect("valid");
-        let renderer = Renderer::new(scene, settings, vec![estimator("regular").expect("registered")]);
+        let renderer = Renderer::new(scene.into(), settings, vec![estimator("regular").expect("registered")]);
         let mut path = renderer.plan().path_settings(renderer.settings());
         (path.direct, path.global) = (true, true);
-        let mut emitter = renderer.emitter(renderer.plan());
+        let mut emitter = renderer.emitter(renderer.plan(), renderer.settings());
         emitter.path = path;
         let pass = emitter.run(0, &|| false);
         let all = pass.stored.direct.iter().chain(&pass.stored.global);

@@ -5,8 +5,8 @@
 use cusp::estimate::registry::estimator;
 use cusp::measure::metrics::{block_average, compare, region_mean};
 use cusp::measure::{Mask, Reference};
+use cusp::render::Silent;
 use cusp::render::film::Image;
-use cusp::render::renderer::Watch;
 use cusp::render::{RenderSettings, Renderer};
 use cusp::scene::open;
 use cusp::scene::scene_file::RenderFile;
@@ -26,10 +26,10 @@ fn flags(photons: i64, footprint_scale: f64) -> RenderFile {
 fn render(name: &str, passes: u32, flags: &RenderFile) -> Image {
     let scene = open(name).expect("built in");
     let settings = RenderSettings::new(&scene, flags, Some([256, 256]), 1).expect("valid");
-    let mut renderer = Renderer::new(scene, settings, vec![estimator("integrated").expect("registered")]);
+    let mut renderer = Renderer::new(scene.into(), settings, vec![estimator("integrated").expect("registered")]);
     let start = std::time::Instant::now();
     for _ in 0..passes {
-        renderer.step(&Watch::SILENT);
+        renderer.step(&Silent);
     }
     println!("{name}: {passes} passes in {:.1} s, {:?}", start.elapsed().as_secs_f64(), renderer.seconds());
     renderer.films()[0].image()

@@ -4,8 +4,8 @@
 
 use cusp::estimate::registry::{estimator, estimators};
 use cusp::measure::metrics::{Mask, compare};
+use cusp::render::Silent;
 use cusp::render::film::Image;
-use cusp::render::renderer::Watch;
 use cusp::render::settings::PlanMode;
 use cusp::render::{RenderSettings, Renderer};
 use cusp::scene::load::scene_from_toml;
@@ -19,9 +19,9 @@ const ALL: &str = "density,regular,regular_3x3:n=2,coplanar,multi_sampled:n=4,in
 fn render(scene: Scene, flags: &RenderFile, names: &str, passes: u32, plan: PlanMode) -> Renderer {
     let mut settings = RenderSettings::new(&scene, flags, Some([64, 64]), 7).expect("valid");
     settings.plan = plan;
-    let mut renderer = Renderer::new(scene, settings, estimators(names).expect("registered"));
+    let mut renderer = Renderer::new(scene.into(), settings, estimators(names).expect("registered"));
     for _ in 0..passes {
-        renderer.step(&Watch::SILENT);
+        renderer.step(&Silent);
     }
     renderer
 }
@@ -186,13 +186,13 @@ fn progressive_passes_converge() {
     let scene = open("ring").expect("built in");
     let flags = RenderFile { footprint_scale: Some(1.5), ..few(200_000) };
     let settings = RenderSettings::new(&scene, &flags, Some([128, 128]), 1).expect("valid");
-    let mut renderer = Renderer::new(scene, settings, vec![estimator("integrated").expect("registered")]);
+    let mut renderer = Renderer::new(scene.into(), settings, vec![estimator("integrated").expect("registered")]);
     let reference = cusp::measure::Reference::built_in("ring").expect("decodes").expect("stored");
     let small = reference.image.resampled([128, 128]);
     let (_, mask) = cusp::measure::metrics::block_average(&reference.image, &reference.mask, 2);
     let mut errors = Vec::new();
     for pass in 1..=32u32 {
-        renderer.step(&Watch::SILENT);
+        renderer.step(&Silent);
         if pass.is_power_of_two() {
             errors.push(compare(&renderer.films()[0].image(), &small, &mask).expect("same size").mse);
         }

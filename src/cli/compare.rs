@@ -3,7 +3,7 @@
 use crate::cli::compare_table::text;
 use crate::cli::failure::Failure;
 use crate::cli::flags::{CommonFlags, rect};
-use crate::cli::progress::{bar, interrupted, listen_for_interrupts};
+use crate::cli::progress::{ProgressWatch, bar, interrupted, listen_for_interrupts};
 use crate::cli::table::percent;
 use crate::cli::{print, to_json};
 use crate::estimate::registry::{self, ESTIMATORS};
@@ -17,17 +17,19 @@ use crate::measure::Reference;
 use crate::measure::metrics::{Mask, compare};
 use crate::measure::window::{busiest_window, contours, disagreement};
 use crate::photons::map::MapParts;
+use crate::render::Step;
 use crate::render::film::{Image, Rect};
 use crate::render::photon_pass::PhotonMaps;
 use crate::render::plan::Slot;
-use crate::render::renderer::{Step, Watch};
 use crate::render::settings::{Gather, LightPart, PlanMode};
 use crate::render::tiles::tiles;
+use crate::render::view_pass::ViewPass;
 use crate::render::{Plan, Renderer};
 use crate::scene::open;
 use clap::{Args, ValueEnum};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::Instant;
 
 /// View rays along a pixel's side in the truth that estimators are compared with.
@@ -147,7 +149,7 @@ impl<'a> Comparison<'a> {
         let regular = Regular::with_rays(TRUTH_RAYS);
         let truth = [Slot { estimator: &regular, gather: settings.gather }];
         let also: &[Slot] = if args.truth == Truth::None { &[] } else { &truth };
-        let renderer = Renderer::planned_for(scene, settings, estimators, also);
+        let renderer = Renderer::planned_for(Arc::new(scene), settings, estimators, also);
         Ok(Self { args, renderer, reference, notes, start, load })
     }
 
@@ -155,7 +157,7 @@ impl<'a> Comparison<'a> {
         let hidden = self.args.flags.quiet || self.args.flags.json;
         let steps = tiles(Rect::whole(self.renderer.settings().size)).len() as u64;
         let progress = bar(steps, "estimators", hidden);
-        let step = self.renderer.step(&Watch { cancelled: &interrupted, tile_done: &|| progress.inc(1) });
+        let step = self.renderer.step(&ProgressWatch { bar: &progress });
         progress.finish_and_clear();
         if step == Step::Cancelled {
             return Err(Failure::Interrupted("nothing was written".into()));
@@ -212,22 +214,22 @@ impl<'a> Comparison<'a> {
             Truth::Crop => crop,
             Truth::Full => Rect::whole(self.renderer.settings().size),
         };
-        let (photons, maps) = self.renderer.last_pass()?;
+        let pass = self.renderer.last_pass()?;
         let parts = MapParts { kd_tree: false, overlap: true };
         let own;
         let maps = if self.renderer.plan().overlap {
-            maps
+            &pass.maps
         } else {
             let scale = self.renderer.settings().footprint_scale;
-            own = PhotonMaps::with_parts(self.renderer.scene(), self.renderer.plan(), &photons.stored, scale, parts);
+            own =
+                PhotonMaps::with_parts(self.renderer.scene(), self.renderer.plan(), &pass.photons.stored, scale, parts);
             &own
         };
         let regular = Regular::with_rays(TRUTH_RAYS);
         let slot = Slot { estimator: &regular, gather: Gather::Overlap };
         let progress = bar(tiles(region).len() as u64, "truth", hidden);
-        let mut pass = self.renderer.view_pass(maps, 0);
-        pass.area_factor = 1.0;
-        let result = pass.run(region, &[slot], &interrupted, &|| progress.inc(1));
+        let view = ViewPass { maps, ..pass.view() };
+        let result = view.run(region, &[slot], &ProgressWatch { bar: &progress });
         progress.finish_and_clear();
         result.complete.then(|| {
             let mut image = Image::black([region.width, region.height]);
@@ -248,10 +250,14 @@ impl<'a> Comparison<'a> {
         let mut settings = r.settings().clone();
         settings.plan = PlanMode::Full;
         let slots = crate::render::renderer::slots(r.estimators(), settings.gather);
-        let full = Plan::new(r.scene(), r.intersector(), &settings, &slots);
+        let full = Plan::new(r.scene(), &settings, &slots, None);
         let timed = |plan: &Plan| {
             let start = Instant::now();
-            let photons = if plan.needs_photons() { r.emitter(plan).run(0, &interrupted) } else { Default::default() };
+            let photons = if plan.needs_photons() {
+                r.emitter(plan, r.settings()).run(0, &interrupted)
+            } else {
+                Default::default()
+            };
             let maps = PhotonMaps::new(r.scene(), plan, &photons.stored, settings.footprint_scale);
             let stored: usize = maps.all().map(|m| m.photons().len()).sum();
             (start.elapsed().as_secs_f64(), stored as u64)

@@ -1,5 +1,7 @@
 //! Progress on standard error, and the interruption by Ctrl-C.
 
+use crate::render::view_pass::{TileResult, TileWatch};
+use crate::render::watch::{TileDone, Watch};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -31,4 +33,30 @@ pub fn bar(steps: u64, what: &str, quiet: bool) -> ProgressBar {
     }
     bar.set_message(what.to_owned());
     bar
+}
+
+/// Moves a bar on with every tile, and stops at Ctrl-C.
+pub struct ProgressWatch<'a> {
+    /// The bar; a step is a tile.
+    pub bar: &'a ProgressBar,
+}
+
+impl Watch for ProgressWatch<'_> {
+    fn cancelled(&self) -> bool {
+        interrupted()
+    }
+
+    fn tile_done(&self, _tile: &TileDone) {
+        self.bar.inc(1);
+    }
+}
+
+impl TileWatch for ProgressWatch<'_> {
+    fn cancelled(&self) -> bool {
+        interrupted()
+    }
+
+    fn tile_done(&self, _tile: &TileResult) {
+        self.bar.inc(1);
+    }
 }

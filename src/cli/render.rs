@@ -2,19 +2,20 @@
 
 use crate::cli::failure::Failure;
 use crate::cli::flags::CommonFlags;
-use crate::cli::progress::{bar, interrupted, listen_for_interrupts};
+use crate::cli::progress::{ProgressWatch, bar, listen_for_interrupts};
 use crate::cli::{print, to_json};
 use crate::estimate::registry::estimator;
 use crate::export::report::RenderReport;
 use crate::export::tone::{auto_exposure, to_srgb};
 use crate::export::{Provenance, exr_file, png_file, whole_file};
 use crate::render::Renderer;
+use crate::render::Step;
 use crate::render::film::Rect;
-use crate::render::renderer::{Step, Watch};
 use crate::render::tiles::tiles;
 use crate::scene::open;
 use clap::Args;
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::time::Instant;
 
 /// Flags of `render`.
@@ -60,7 +61,7 @@ pub fn run(args: &RenderArgs) -> Result<(), Failure> {
         let chosen = estimator(&settings.estimator)?;
         let name = chosen.name();
         let load = start.elapsed().as_secs_f64();
-        let mut renderer = Renderer::new(scene, settings, vec![chosen]);
+        let mut renderer = Renderer::new(Arc::new(scene), settings, vec![chosen]);
         let finished = passes(args, &mut renderer, &start);
         let passes = renderer.passes();
         if passes == 0 {
@@ -101,7 +102,7 @@ fn passes(args: &RenderArgs, renderer: &mut Renderer, start: &Instant) -> bool {
     let per_pass = tiles(Rect::whole(renderer.settings().size)).len() as u64;
     let shown = if wanted == u32::MAX { 1 } else { wanted };
     let bar = bar(per_pass * u64::from(shown), "render", args.flags.quiet || args.flags.json);
-    let watch = Watch { cancelled: &interrupted, tile_done: &|| bar.inc(1) };
+    let watch = ProgressWatch { bar: &bar };
     let mut finished = true;
     while renderer.passes() < wanted {
         if args.seconds.is_some_and(|s| renderer.passes() > 0 && start.elapsed().as_secs_f64() >= s) {

@@ -18,7 +18,7 @@ use std::ops::AddAssign;
 pub const MAX_ANGLE: f32 = 10.0;
 
 /// Which photons are kept, and how paths are followed.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PathSettings {
     /// Surfaces that a path may meet.
     pub max_depth: u32,

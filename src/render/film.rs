@@ -42,6 +42,20 @@ impl Film {
         self.passes += 1;
     }
 
+    /// The mean of the finished passes and one more, for the pixels of `rect` whose values in that pass are `pixels`.
+    ///
+    /// The same bits as [`Film::image`] has when that pass has been added.
+    pub fn mean_with(&self, rect: Rect, pixels: &[Rgb]) -> Vec<Rgb> {
+        let n = f64::from(self.passes + 1);
+        let mut means = Vec::with_capacity(pixels.len());
+        for (row, line) in pixels.chunks(rect.width as usize).enumerate() {
+            let start = (rect.y as usize + row) * self.size[0] as usize + rect.x as usize;
+            let sums = &self.sum[start..start + line.len()];
+            means.extend(sums.iter().zip(line).map(|(sum, p)| ((*sum + p.as_dvec3()) / n).as_vec3()));
+        }
+        means
+    }
+
     /// The mean of the finished passes, radiance in W/(m² sr).
     pub fn image(&self) -> Image {
         let n = f64::from(self.passes.max(1));

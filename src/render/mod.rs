@@ -1,7 +1,9 @@
 //! Rendering: settings, plan, photon pass, view pass, film, and the progressive renderer that drives them.
 
+pub mod change;
 pub mod direct;
 pub mod film;
+pub mod pass;
 pub mod photon_pass;
 pub mod plan;
 pub mod renderer;
@@ -10,8 +12,11 @@ pub mod stats;
 pub mod tiles;
 pub mod view;
 pub mod view_pass;
+pub mod watch;
 
 pub use film::Film;
+pub use pass::Pass;
 pub use plan::Plan;
-pub use renderer::Renderer;
+pub use renderer::{Renderer, Step};
 pub use settings::{Gather, LightPart, RenderSettings};
+pub use watch::{Silent, Watch};

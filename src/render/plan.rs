@@ -59,14 +59,12 @@ pub struct Slot<'a> {
 }
 
 impl Plan {
-    /// Plans for a scene and estimators; sends [`PILOT_PHOTONS`] ahead if light may take more than one way.
-    pub fn new(scene: &Scene, intersector: &Intersector, settings: &RenderSettings, slots: &[Slot]) -> Self {
+    /// Plans for a scene and estimators, on the evidence of a pilot where [`Pilot::needed`] says so.
+    pub fn new(scene: &Scene, settings: &RenderSettings, slots: &[Slot], pilot: Option<&Pilot>) -> Self {
         let full = settings.plan == PlanMode::Full;
         let shows = |part| settings.light == LightPart::All || settings.light == part;
         let lit = scene.total_flux() > 0.0;
         let direct_by_photons = settings.direct == DirectLight::Photons && shows(LightPart::Direct);
-        let any_indirect = shows(LightPart::Caustic) || shows(LightPart::Global);
-        let pilot = (lit && any_indirect && !full).then(|| pilot(scene, intersector, settings));
         let mut items = Vec::new();
         let mut item = |part, on, why: String| {
             items.push(PlanItem { part, on, why });
@@ -75,7 +73,7 @@ impl Plan {
 
         let has_specular = scene.has_specular();
         let caustic_map = {
-            let (on, why) = match &pilot {
+            let (on, why) = match pilot {
                 _ if !shows(LightPart::Caustic) => (false, "this light is not asked for".into()),
                 _ if full => (true, "forced on".into()),
                 None => (false, "no light has power".into()),
@@ -86,7 +84,7 @@ impl Plan {
             item("caustic map", on, why)
         };
         let global_map = {
-            let (on, why) = match &pilot {
+            let (on, why) = match pilot {
                 _ if !shows(LightPart::Global) => (false, "this light is not asked for".into()),
                 _ if full => (true, "forced on".into()),
                 None => (false, "no light has power".into()),
@@ -223,13 +221,37 @@ impl Plan {
     }
 }
 
-struct Pilot {
+/// Photons sent ahead of a render, to see where light goes.
+#[derive(Clone, Copy, Debug)]
+pub struct Pilot {
     emitted: u64,
     caustic: u64,
     global: u64,
 }
 
 impl Pilot {
+    /// Whether a plan asks for one: light may take more than one way, and not every part is forced on.
+    pub fn needed(scene: &Scene, settings: &RenderSettings) -> bool {
+        settings.plan == PlanMode::Needed && settings.light != LightPart::Direct && scene.total_flux() > 0.0
+    }
+
+    /// Sends [`PILOT_PHOTONS`], which carry no differentials.
+    pub fn send(scene: &Scene, intersector: &Intersector, settings: &RenderSettings) -> Self {
+        let path = PathSettings {
+            max_depth: settings.max_depth,
+            direct: false,
+            caustic: true,
+            global: true,
+            differentials: false,
+            spread: settings.diffuse_spread,
+        };
+        let (sampling, seed) = (settings.sampling, settings.seed);
+        let emitter = Emitter { scene, intersector, path, sampling, photons: PILOT_PHOTONS, seed };
+        let pass = emitter.run(photon_pass::PILOT_PASS, &|| false);
+        let (caustic, global) = (pass.stored.caustic.len() as u64, pass.stored.global.len() as u64);
+        Self { emitted: pass.emitted, caustic, global }
+    }
+
     fn verdict(&self, count: u64, what: &str) -> (bool, String) {
         let n = self.emitted;
         if count > 0 {
@@ -240,19 +262,4 @@ impl Pilot {
             (false, format!("of {n} pilot photons none {what} (below {bound:.3} % with 95 % confidence)"))
         }
     }
-}
-
-fn pilot(scene: &Scene, intersector: &Intersector, settings: &RenderSettings) -> Pilot {
-    let path = PathSettings {
-        max_depth: settings.max_depth,
-        direct: false,
-        caustic: true,
-        global: true,
-        differentials: false,
-        spread: settings.diffuse_spread,
-    };
-    let emitter =
-        Emitter { scene, intersector, path, sampling: settings.sampling, photons: PILOT_PHOTONS, seed: settings.seed };
-    let pass = emitter.run(photon_pass::PILOT_PASS, &|| false);
-    Pilot { emitted: pass.emitted, caustic: pass.stored.caustic.len() as u64, global: pass.stored.global.len() as u64 }
 }

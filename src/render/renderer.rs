@@ -1,16 +1,18 @@
 //! The progressive renderer: a value that makes one pass at each step.
 
-use crate::estimate::Estimator;
-use crate::estimate::Lookup;
+use crate::estimate::{Estimator, Lookup};
+use crate::render::change::{PhotonStore, World, film_is_kept, photons_are_kept};
 use crate::render::film::{Film, Rect};
+use crate::render::pass::Pass;
 use crate::render::photon_pass::{Emitter, PhotonMaps, PhotonPass};
-use crate::render::plan::{Plan, Slot};
-use crate::render::settings::{Gather, RenderSettings};
+use crate::render::plan::{Pilot, Plan, Slot};
+use crate::render::settings::{Gather, PlanMode, RenderSettings};
 use crate::render::stats::{Bounded, Seconds, StoredCounts};
-use crate::render::view::ViewTracer;
-use crate::render::view_pass::{PartSeconds, ViewPass, ViewResult};
+use crate::render::view_pass::{PartSeconds, ViewResult};
+use crate::render::watch::{FilmWatch, Watch};
 use crate::scene::Scene;
 use crate::trace::Intersector;
+use std::sync::Arc;
 use std::time::Instant;
 
 /// Exponent of the shrinking of footprints (Knaus and Zwicker 2011).
@@ -26,19 +28,6 @@ fn next_area(area: f64, pass: u32) -> f64 {
     area * (f64::from(pass) + ALPHA) / (f64::from(pass) + 1.0)
 }
 
-/// What callers are asked and told while a pass runs, from any thread.
-pub struct Watch<'a> {
-    /// Whether to stop.
-    pub cancelled: &'a (dyn Fn() -> bool + Sync),
-    /// Called after each tile.
-    pub tile_done: &'a (dyn Fn() + Sync),
-}
-
-impl Watch<'static> {
-    /// Never stops, tells nobody.
-    pub const SILENT: Self = Self { cancelled: &|| false, tile_done: &|| {} };
-}
-
 /// How a step ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Step {
@@ -49,161 +38,320 @@ pub enum Step {
 }
 
 /// A scene, its settings and estimators, and the images so far.
+///
+/// All estimators see the same photons in a pass of the same number. One that came later, or whose settings were
+/// changed, catches up by itself before all go on together.
 pub struct Renderer {
-    scene: Scene,
-    intersector: Intersector,
+    scene: Arc<Scene>,
+    intersector: Arc<Intersector>,
     settings: RenderSettings,
     estimators: Vec<Box<dyn Estimator>>,
     plan: Plan,
+    pilot: Option<Pilot>,
+    plan_is_stale: bool,
     films: Vec<Film>,
-    /// Photons and maps of the last pass.
-    last: Option<(PhotonPass, PhotonMaps)>,
+    /// The last pass.
+    last: Option<Arc<Pass>>,
+    photons: PhotonStore,
     seconds: Seconds,
     estimator_seconds: Vec<PartSeconds>,
+    photon_seconds: Vec<f64>,
     gathered: Vec<u64>,
+    /// Passes whose photons are in the counts below.
+    counted: u32,
     emitted: u64,
     stored: StoredCounts,
     bounded: Bounded,
     inside_glass: u64,
-    area: f64,
+    /// Area of footprints for each pass so far.
+    areas: Vec<f64>,
 }
 
 impl Renderer {
     /// Prepares a render: builds the hierarchy and makes the plan.
-    pub fn new(scene: Scene, settings: RenderSettings, estimators: Vec<Box<dyn Estimator>>) -> Self {
+    pub fn new(scene: Arc<Scene>, settings: RenderSettings, estimators: Vec<Box<dyn Estimator>>) -> Self {
         Self::planned_for(scene, settings, estimators, &[])
     }
 
     /// The same with a plan that also serves `also`, for passes over the same photons by other estimators.
     pub fn planned_for(
-        scene: Scene,
+        scene: Arc<Scene>,
         settings: RenderSettings,
         estimators: Vec<Box<dyn Estimator>>,
         also: &[Slot],
     ) -> Self {
+        let mut renderer = Self::unplanned(scene, settings, estimators);
+        renderer.make_plan(also);
+        renderer
+    }
+
+    /// The same without a plan yet: the first step makes it. Until then [`Renderer::plan`] has every part on.
+    pub fn unplanned(scene: Arc<Scene>, settings: RenderSettings, estimators: Vec<Box<dyn Estimator>>) -> Self {
         let start = Instant::now();
-        let intersector = Intersector::new(&scene.geometry, scene.radius);
+        let intersector = Arc::new(Intersector::new(&scene.geometry, scene.radius));
         let bvh = start.elapsed().as_secs_f64();
-        let start = Instant::now();
-        let mut served = slots(&estimators, settings.gather);
-        served.extend_from_slice(also);
-        let plan = Plan::new(&scene, &intersector, &settings, &served);
-        let planned = start.elapsed().as_secs_f64();
         let size = settings.size;
+        let plan = {
+            let full = RenderSettings { plan: PlanMode::Full, ..settings.clone() };
+            Plan::new(&scene, &full, &slots(&estimators, settings.gather), None)
+        };
         Self {
             films: estimators.iter().map(|_| Film::new(size)).collect(),
             estimator_seconds: vec![PartSeconds::default(); estimators.len()],
+            photon_seconds: vec![0.0; estimators.len()],
             gathered: vec![0; estimators.len()],
             scene,
             intersector,
             settings,
             estimators,
             plan,
+            pilot: None,
+            plan_is_stale: true,
             last: None,
-            seconds: Seconds { bvh, plan: planned, ..Default::default() },
+            photons: PhotonStore::default(),
+            seconds: Seconds { bvh, ..Default::default() },
+            counted: 0,
             emitted: 0,
             stored: StoredCounts::default(),
             bounded: Bounded::default(),
             inside_glass: 0,
-            area: 1.0,
+            areas: vec![1.0],
         }
     }
 
-    /// Makes the next pass: photons, maps, and one image for each estimator.
-    ///
-    /// The same settings give the same bits, whatever the number of threads.
-    pub fn step(&mut self, watch: &Watch) -> Step {
-        let pass = self.films.first().map_or(0, Film::passes);
-        let start = Instant::now();
-        let photons = if self.plan.needs_photons() {
-            self.emitter(&self.plan).run(u64::from(pass), watch.cancelled)
-        } else {
-            PhotonPass::default()
-        };
-        let photon_trace = start.elapsed().as_secs_f64();
-        if (watch.cancelled)() {
-            return Step::Cancelled;
-        }
-        let start = Instant::now();
-        let scale = f64::from(self.settings.footprint_scale) * self.area.sqrt();
-        let maps = PhotonMaps::new(&self.scene, &self.plan, &photons.stored, scale as f32);
-        let map_build = start.elapsed().as_secs_f64();
+    /// Keeps the photons of passes for estimators that come later, in at most so many bytes. By default none are kept.
+    pub fn keep_photons(&mut self, bytes: usize) {
+        self.photons = PhotonStore::of(bytes);
+    }
 
-        let region = Rect::whole(self.settings.size);
-        let result = self.view_pass(&maps, pass).run(
-            region,
-            &slots(&self.estimators, self.settings.gather),
-            watch.cancelled,
-            watch.tile_done,
-        );
-        if !result.complete {
-            return Step::Cancelled;
+    /// Goes on with another scene, settings or estimators. What the change does not touch is kept: the hierarchy while
+    /// the surfaces are the same, photons while what made them is, and the image of each estimator while nothing that
+    /// it depends on has changed.
+    pub fn change(&mut self, scene: Arc<Scene>, settings: RenderSettings, estimators: Vec<Box<dyn Estimator>>) {
+        if !Arc::ptr_eq(&scene.geometry, &self.scene.geometry) {
+            let start = Instant::now();
+            self.intersector = Arc::new(Intersector::new(&scene.geometry, scene.radius));
+            self.seconds.bvh = start.elapsed().as_secs_f64();
         }
-        self.seconds.photon_trace += photon_trace;
-        self.seconds.map_build += map_build;
-        self.record(&photons, &maps, &result);
-        for tile in &result.tiles {
-            for (film, image) in self.films.iter_mut().zip(&tile.images) {
-                film.add_tile([tile.rect.x, tile.rect.y], tile.rect.width, &image.pixels);
+        let same_world = World::of(&scene) == World::of(&self.scene);
+        let same_photons = same_world && photons_are_kept(&self.settings, &settings);
+        if !same_photons {
+            self.photons.clear();
+            self.forget_counts();
+        }
+        if !same_world || settings.seed != self.settings.seed || settings.max_depth != self.settings.max_depth {
+            self.pilot = None;
+        }
+        let mut kept: Vec<Option<usize>> = estimators
+            .iter()
+            .map(|e| {
+                let old = self.estimators.iter().position(|o| o.name() == e.name())?;
+                (same_photons && film_is_kept((&self.scene, &self.settings), (&scene, &settings), e.as_ref()))
+                    .then_some(old)
+            })
+            .collect();
+        // A film has one heir.
+        for i in 1..kept.len() {
+            if kept[..i].contains(&kept[i]) {
+                kept[i] = None;
             }
         }
-        self.films.iter_mut().for_each(Film::finish_pass);
-        self.last = Some((photons, maps));
-        self.area = next_area(self.area, pass + 1);
+        let size = settings.size;
+        let mut old = std::mem::take(&mut self.films).into_iter().map(Some).collect::<Vec<_>>();
+        self.films = kept.iter().map(|k| k.and_then(|k| old[k].take()).unwrap_or_else(|| Film::new(size))).collect();
+        let heirs = |values: &[f64]| kept.iter().map(|k| k.map_or(0.0, |k| values[k])).collect();
+        self.photon_seconds = heirs(&self.photon_seconds);
+        self.estimator_seconds =
+            kept.iter().map(|k| k.map_or(Default::default(), |k| self.estimator_seconds[k])).collect();
+        self.gathered = kept.iter().map(|k| k.map_or(0, |k| self.gathered[k])).collect();
+        self.scene = scene;
+        self.settings = settings;
+        self.estimators = estimators;
+        self.plan_is_stale = true;
+    }
+
+    fn forget_counts(&mut self) {
+        self.last = None;
+        self.counted = 0;
+        self.emitted = 0;
+        self.stored = StoredCounts::default();
+        self.bounded = Bounded::default();
+        self.inside_glass = 0;
+        self.seconds = Seconds { bvh: self.seconds.bvh, plan: self.seconds.plan, ..Default::default() };
+    }
+
+    fn make_plan(&mut self, also: &[Slot]) {
+        let start = Instant::now();
+        if self.pilot.is_none() {
+            self.pilot = Pilot::needed(&self.scene, &self.settings)
+                .then(|| Pilot::send(&self.scene, &self.intersector, &self.settings));
+        }
+        let mut served = slots(&self.estimators, self.settings.gather);
+        served.extend_from_slice(also);
+        self.plan = Plan::new(&self.scene, &self.settings, &served, self.pilot.as_ref());
+        self.plan_is_stale = false;
+        self.seconds.plan = start.elapsed().as_secs_f64();
+    }
+
+    /// Makes the next pass of the estimators that have the fewest: photons, maps, and one image for each of them.
+    ///
+    /// The same settings give the same bits, whatever the number of threads.
+    pub fn step(&mut self, watch: &dyn Watch) -> Step {
+        if self.plan_is_stale {
+            self.make_plan(&[]);
+        }
+        let number = self.passes();
+        let now: Vec<usize> = (0..self.films.len()).filter(|&i| self.films[i].passes() == number).collect();
+        let Some((pass, photon_trace, map_build)) = self.pass(number, watch) else {
+            return Step::Cancelled;
+        };
+        watch.pass_started(&pass, false);
+        let Some(result) = self.view(&pass, &now, false, watch) else {
+            return Step::Cancelled;
+        };
+        self.record(&pass, &now, &result, photon_trace + map_build);
+        if pass.number == self.counted {
+            self.count(&pass, photon_trace, map_build);
+        }
+        for tile in &result.tiles {
+            for (&i, image) in now.iter().zip(&tile.images) {
+                self.films[i].add_tile([tile.rect.x, tile.rect.y], tile.rect.width, &image.pixels);
+            }
+        }
+        now.iter().for_each(|&i| self.films[i].finish_pass());
+        self.last = Some(pass);
         Step::Done
     }
 
-    fn record(&mut self, photons: &PhotonPass, maps: &PhotonMaps, result: &ViewResult) {
-        self.emitted += photons.emitted;
-        self.stored.direct += photons.stored.direct.len() as u64;
-        self.stored.caustic += photons.stored.caustic.len() as u64;
-        self.stored.global += photons.stored.global.len() as u64;
-        self.bounded.photons += photons.counts;
+    /// Shows what the next pass may look like, with few photons and no pilot, and keeps nothing of it.
+    ///
+    /// `photons` are emitted in place of the settings' number; their footprints are larger by as much.
+    pub fn draft(&self, photons: u64, watch: &dyn Watch) -> Step {
+        let settings = RenderSettings { photons, plan: PlanMode::Full, ..self.settings.clone() };
+        let plan = Plan::new(&self.scene, &settings, &slots(&self.estimators, settings.gather), None);
+        let number = self.passes();
+        let now: Vec<usize> = (0..self.films.len()).filter(|&i| self.films[i].passes() == number).collect();
+        let photons = self.emitter(&plan, &settings).run(0, &|| watch.cancelled());
+        let pass = self.pass_of(settings, plan, Arc::new(photons), 0, 1.0);
+        if watch.cancelled() {
+            return Step::Cancelled;
+        }
+        watch.pass_started(&pass, true);
+        match self.view(&pass, &now, true, watch) {
+            Some(_) => Step::Done,
+            None => Step::Cancelled,
+        }
+    }
+
+    /// Photons and maps of pass `number`, with the seconds of both; None if cancelled.
+    fn pass(&mut self, number: u32, watch: &dyn Watch) -> Option<(Arc<Pass>, f64, f64)> {
+        let path = self.plan.path_settings(&self.settings);
+        let (photons, photon_trace) = match self.photons.get(number, &path) {
+            Some(kept) => kept,
+            None => {
+                let start = Instant::now();
+                let photons = if self.plan.needs_photons() {
+                    self.emitter(&self.plan, &self.settings).run(u64::from(number), &|| watch.cancelled())
+                } else {
+                    PhotonPass::default()
+                };
+                let seconds = start.elapsed().as_secs_f64();
+                if watch.cancelled() {
+                    return None;
+                }
+                let photons = Arc::new(photons);
+                self.photons.put(number, path, &photons, seconds);
+                (photons, seconds)
+            }
+        };
+        while self.areas.len() <= number as usize {
+            let next = next_area(self.areas[self.areas.len() - 1], self.areas.len() as u32);
+            self.areas.push(next);
+        }
+        let start = Instant::now();
+        let area = self.areas[number as usize];
+        let pass = self.pass_of(self.settings.clone(), self.plan.clone(), photons, number, area);
+        let map_build = start.elapsed().as_secs_f64();
+        (!watch.cancelled()).then_some((pass, photon_trace, map_build))
+    }
+
+    fn pass_of(
+        &self,
+        settings: RenderSettings,
+        plan: Plan,
+        photons: Arc<PhotonPass>,
+        number: u32,
+        area_factor: f64,
+    ) -> Arc<Pass> {
+        let scale = (f64::from(settings.footprint_scale) * area_factor.sqrt()) as f32;
+        let maps = PhotonMaps::new(&self.scene, &plan, &photons.stored, scale);
+        let (scene, intersector) = (Arc::clone(&self.scene), Arc::clone(&self.intersector));
+        Arc::new(Pass { scene, intersector, settings, plan, photons, maps, number, area_factor })
+    }
+
+    /// Views of a pass by the estimators `now`; None if cancelled.
+    fn view(&self, pass: &Pass, now: &[usize], draft: bool, watch: &dyn Watch) -> Option<ViewResult> {
+        let all = slots(&self.estimators, self.settings.gather);
+        let chosen: Vec<Slot> = now.iter().map(|&i| all[i]).collect();
+        let films: Vec<&Film> = now.iter().map(|&i| &self.films[i]).collect();
+        let watch = FilmWatch { watch, estimators: now, films: &films, draft };
+        let result = pass.view().run(Rect::whole(self.settings.size), &chosen, &watch);
+        result.complete.then_some(result)
+    }
+
+    /// Adds up what the estimators `now` cost.
+    fn record(&mut self, pass: &Pass, now: &[usize], result: &ViewResult, photon_seconds: f64) {
         self.bounded.views += result.counts.bounded;
-        let (floor, ceiling) = maps.limited();
-        self.bounded.footprint_floor += floor;
-        self.bounded.footprint_ceiling += ceiling;
         self.inside_glass += result.counts.camera_inside_glass;
         self.seconds.view_trace += result.view_trace;
-        for (i, s) in result.seconds.iter().enumerate() {
+        for (slot, &i) in now.iter().enumerate() {
+            let s = &result.seconds[slot];
             self.estimator_seconds[i].view_trace += s.view_trace;
             self.estimator_seconds[i].gather += s.gather;
             self.estimator_seconds[i].estimate += s.estimate;
-            self.gathered[i] += result.gathered[i];
+            self.photon_seconds[i] += if pass.plan.needs_photons() { photon_seconds } else { 0.0 };
+            self.gathered[i] += result.gathered[slot];
             self.seconds.gather += s.gather;
             self.seconds.estimate += s.estimate;
         }
     }
 
-    /// What traces photons under `plan`.
-    pub fn emitter(&self, plan: &Plan) -> Emitter<'_> {
+    /// Adds up the photons of a pass that is seen for the first time.
+    fn count(&mut self, pass: &Pass, photon_trace: f64, map_build: f64) {
+        self.counted += 1;
+        self.seconds.photon_trace += photon_trace;
+        self.seconds.map_build += map_build;
+        let (photons, stored) = (&pass.photons, &pass.photons.stored);
+        self.emitted += photons.emitted;
+        self.stored.direct += stored.direct.len() as u64;
+        self.stored.caustic += stored.caustic.len() as u64;
+        self.stored.global += stored.global.len() as u64;
+        self.bounded.photons += photons.counts;
+        let (floor, ceiling) = pass.maps.limited();
+        self.bounded.footprint_floor += floor;
+        self.bounded.footprint_ceiling += ceiling;
+    }
+
+    /// What traces photons under `plan` and `settings`, which may ask for another number of photons.
+    pub fn emitter(&self, plan: &Plan, settings: &RenderSettings) -> Emitter<'_> {
         Emitter {
             scene: &self.scene,
             intersector: &self.intersector,
-            path: plan.path_settings(&self.settings),
-            sampling: self.settings.sampling,
-            photons: self.settings.photons,
-            seed: self.settings.seed,
+            path: plan.path_settings(settings),
+            sampling: settings.sampling,
+            photons: settings.photons,
+            seed: settings.seed,
         }
     }
 
-    /// What renders views of `maps` in pass number `pass`.
-    pub fn view_pass<'a>(&'a self, maps: &'a PhotonMaps, pass: u32) -> ViewPass<'a> {
-        ViewPass {
-            tracer: ViewTracer {
-                scene: &self.scene,
-                intersector: &self.intersector,
-                settings: &self.settings,
-                plan: &self.plan,
-            },
-            maps,
-            pass,
-            area_factor: self.area as f32,
-        }
+    /// Whether the next step can begin without tracing photons.
+    pub fn has_next_photons(&self) -> bool {
+        let path = self.plan.path_settings(&self.settings);
+        !self.plan_is_stale && (!self.plan.needs_photons() || self.photons.get(self.passes(), &path).is_some())
     }
 
     /// The scene.
-    pub fn scene(&self) -> &Scene {
+    pub fn scene(&self) -> &Arc<Scene> {
         &self.scene
     }
 
@@ -232,13 +380,13 @@ impl Renderer {
         &self.films
     }
 
-    /// Finished passes.
+    /// Passes that all estimators have finished.
     pub fn passes(&self) -> u32 {
-        self.films.first().map_or(0, Film::passes)
+        self.films.iter().map(Film::passes).min().unwrap_or(0)
     }
 
     /// Photons and maps of the last pass.
-    pub fn last_pass(&self) -> Option<&(PhotonPass, PhotonMaps)> {
+    pub fn last_pass(&self) -> Option<&Arc<Pass>> {
         self.last.as_ref()
     }
 
@@ -250,6 +398,11 @@ impl Renderer {
     /// Seconds of each estimator's view passes.
     pub fn estimator_seconds(&self) -> &[PartSeconds] {
         &self.estimator_seconds
+    }
+
+    /// Seconds of photons and maps of each estimator's passes, also of those that it shared with others.
+    pub fn photon_seconds(&self) -> &[f64] {
+        &self.photon_seconds
     }
 
     /// Photons looked at by each estimator.
@@ -275,7 +428,7 @@ impl Renderer {
     /// What was defined but odd: the scene's warnings, and what the passes met.
     pub fn warnings(&self) -> Vec<String> {
         let mut all = self.scene.warnings.clone();
-        if self.passes() > 0 && self.plan.needs_photons() && self.stored == StoredCounts::default() {
+        if self.counted > 0 && self.plan.needs_photons() && self.stored == StoredCounts::default() {
             all.push(format!("none of {} photons was stored", self.emitted));
         }
         if self.inside_glass > 0 {

@@ -93,6 +93,20 @@ pub struct ViewResult {
     pub complete: bool,
 }
 
+/// Follows a view pass. Every method may be called from any thread, several at once.
+pub trait TileWatch: Sync {
+    /// Whether to stop. Returns at once.
+    fn cancelled(&self) -> bool;
+
+    /// Asked before each tile: whether to make it. It may block, which pauses the pass.
+    fn tile_allowed(&self) -> bool {
+        !self.cancelled()
+    }
+
+    /// A tile is done.
+    fn tile_done(&self, tile: &TileResult);
+}
+
 /// Photons that are gathered before they are estimated; a hit's own may exceed it.
 const BATCH: usize = 1 << 20;
 
@@ -108,25 +122,19 @@ struct Scratch {
 }
 
 impl ViewPass<'_> {
-    /// Renders `region` for every slot. `tile_done` is called for each tile from the thread that made it.
-    pub fn run(
-        &self,
-        region: Rect,
-        slots: &[Slot],
-        cancelled: &(dyn Fn() -> bool + Sync),
-        tile_done: &(dyn Fn() + Sync),
-    ) -> ViewResult {
+    /// Renders `region` for every slot; `watch` is asked and told from the threads that make the tiles.
+    pub fn run(&self, region: Rect, slots: &[Slot], watch: &dyn TileWatch) -> ViewResult {
         let start = Instant::now();
         let all = tiles(region);
         let results: Vec<Option<TileResult>> = all
             .par_iter()
             .enumerate()
             .map_init(Scratch::default, |scratch, (number, rect)| {
-                if cancelled() {
+                if !watch.tile_allowed() {
                     return None;
                 }
-                let tile = self.tile(*rect, number, slots, scratch);
-                tile_done();
+                let tile = self.tile(*rect, number, slots, scratch, watch)?;
+                watch.tile_done(&tile);
                 Some(tile)
             })
             .collect();
@@ -151,8 +159,15 @@ impl ViewPass<'_> {
         ViewResult { view_trace: view_trace * scale, tiles, seconds, wall, gathered, counts, complete }
     }
 
-    /// One tile. Slots take turns at being first, so that none always finds the caches cold.
-    fn tile(&self, rect: Rect, number: usize, slots: &[Slot], scratch: &mut Scratch) -> TileResult {
+    /// One tile; None if cancelled. Slots take turns at being first, so that none always finds the caches cold.
+    fn tile(
+        &self,
+        rect: Rect,
+        number: usize,
+        slots: &[Slot],
+        scratch: &mut Scratch,
+        watch: &dyn TileWatch,
+    ) -> Option<TileResult> {
         let mut counts = ViewCounts::default();
         let mut images: Vec<Option<TileImage>> = slots.iter().map(|_| None).collect();
         let mut rays: Vec<u32> = slots.iter().map(|s| s.estimator.rays_per_axis()).collect();
@@ -167,19 +182,22 @@ impl ViewPass<'_> {
             for k in 0..slots.len() {
                 let i = (k + number) % slots.len();
                 if slots[i].estimator.rays_per_axis() == n {
+                    if watch.cancelled() {
+                        return None;
+                    }
                     let mut image = self.estimate(&base, n, &slots[i], scratch);
                     image.seconds.view_trace = view_trace;
                     images[i] = Some(image);
                 }
             }
         }
-        TileResult {
+        Some(TileResult {
             rect,
             // Each slot's number of rays is in the list that was just gone through.
             images: images.into_iter().flatten().collect(),
             view_trace: all_rays,
             counts,
-        }
+        })
     }
 
     /// Traces `n`×`n` rays for each pixel; hits go to the scratch, the sum of other light to the result.

@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 /// A pinhole camera.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
     /// Eye, local coordinates, metres.
     pub position: Vec3,

@@ -5,7 +5,7 @@ use glam::Vec3;
 use std::f32::consts::{PI, TAU};
 
 /// A light source, in local coordinates and metres.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Light {
     /// A point that shines the same in all directions.
     Point {

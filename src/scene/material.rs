@@ -6,7 +6,7 @@ use glam::Vec2;
 use std::sync::Arc;
 
 /// A surface's material. Reflectances lie in `[0, 1]`.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Material {
     /// Lambertian reflection.
     Diffuse {

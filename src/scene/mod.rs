@@ -25,6 +25,7 @@ pub use source::open;
 
 use glam::{DVec3, Vec3};
 use scene_file::RenderFile;
+use std::sync::Arc;
 
 /// Everything that is lit, in metres about a local origin.
 #[derive(Clone, Debug)]
@@ -42,7 +43,7 @@ pub struct Scene {
     /// The camera.
     pub camera: Camera,
     /// The surfaces.
-    pub geometry: Geometry,
+    pub geometry: Arc<Geometry>,
     /// Materials, indexed by [`Geometry`].
     pub materials: Vec<Material>,
     /// Light sources.

@@ -6,7 +6,7 @@ use glam::Vec2;
 use std::path::Path;
 
 /// An image of linear reflectances, repeated over the plane.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Texture {
     size: [u32; 2],
     texels: Vec<Rgb>,

@@ -178,7 +178,7 @@ mod tests {
     fn normal_differential_converges_to_second_order_on_a_smooth_triangle() {
         let b = built_in::find("plane").expect("built in");
         let mut scene = open_built_in(b).expect("opens");
-        scene.geometry = Geometry {
+        scene.geometry = std::sync::Arc::new(Geometry {
             positions: vec![Vec3::ZERO, Vec3::new(2.0, 0.0, 0.1), Vec3::new(0.3, 0.2, -1.7)],
             normals: [Vec3::new(-0.9, 1.0, 0.3), Vec3::new(1.0, 0.8, 0.2), Vec3::new(0.1, 1.0, -0.9)]
                 .map(Vec3::normalize)
@@ -188,7 +188,7 @@ mod tests {
             corner_uvs: vec![[NONE; 3]],
             triangle_materials: vec![0],
             ..Default::default()
-        };
+        });
         let intersector = Intersector::new(&scene.geometry, scene.radius);
         let at = |x: f32, z: f32| {
             let ray = Ray { origin: Vec3::new(x, 3.0, z), direction: Vec3::NEG_Y };

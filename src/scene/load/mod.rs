@@ -242,7 +242,7 @@ impl Loader<'_> {
                 resolution: camera.resolution,
             },
             lights: lights.collect(),
-            geometry,
+            geometry: geometry.into(),
             materials: self.assembly.materials,
             render,
             render_lines: self.locator.lines_of("render"),

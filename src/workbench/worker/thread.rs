@@ -1,0 +1,146 @@
+//! The render thread's loop.
+
+use super::Wake;
+use super::gate::Gate;
+use super::messages::{Command, Event, Job, Progress, TileImage};
+use crate::estimate::{Estimator, registry};
+use crate::render::pass::Pass;
+use crate::render::watch::{TileDone, Watch};
+use crate::render::{Renderer, Step};
+use crossbeam_channel::{Receiver, SendTimeoutError, Sender};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
+use std::time::Duration;
+
+/// Bytes of photons that are kept for estimators that come later.
+const PHOTON_BYTES: usize = 512 << 20;
+/// Photons of a draft. Passes of more than this show one first.
+const DRAFT_PHOTONS: u64 = 20_000;
+/// How long a send waits before it looks whether its event is stale.
+const PATIENCE: Duration = Duration::from_millis(5);
+
+/// Renders what comes in until it is told to quit or the window is gone; a panic is reported and ends the thread.
+pub(super) fn run(inbox: &Receiver<Command>, outbox: &Sender<Event>, gate: &Gate, wake: &Wake) {
+    let work = AssertUnwindSafe(|| Loop { inbox, outbox, gate, wake, renderer: None }.run());
+    if let Err(panic) = catch_unwind(work) {
+        let what = panic
+            .downcast_ref::<&str>()
+            .map(|s| (*s).to_owned())
+            .or_else(|| panic.downcast_ref::<String>().cloned())
+            .unwrap_or_else(|| "no reason given".into());
+        let why = format!("the render thread has stopped by a defect: {what}");
+        let _ = outbox.send_timeout(Event::Failed { why }, Duration::from_secs(10));
+        wake();
+    }
+}
+
+struct Loop<'a> {
+    inbox: &'a Receiver<Command>,
+    outbox: &'a Sender<Event>,
+    gate: &'a Gate,
+    wake: &'a Wake,
+    renderer: Option<Renderer>,
+}
+
+impl Loop<'_> {
+    fn run(mut self) {
+        while let Ok(Command::Render(first)) = self.inbox.recv() {
+            let mut job = first;
+            // Only the newest counts.
+            while let Ok(next) = self.inbox.try_recv() {
+                match next {
+                    Command::Render(newer) => job = newer,
+                    Command::Quit => return,
+                }
+            }
+            self.job(&job);
+        }
+    }
+
+    /// Renders a job until it is done or stale.
+    fn job(&mut self, job: &Job) {
+        let estimators: Vec<Box<dyn Estimator>> =
+            job.estimators.iter().filter_map(|e| registry::estimator(e).ok()).collect();
+        let (scene, settings) = (Arc::clone(&job.scene), job.settings.clone());
+        match &mut self.renderer {
+            Some(renderer) => renderer.change(scene, settings, estimators),
+            None => {
+                let mut renderer = Renderer::unplanned(scene, settings, estimators);
+                renderer.keep_photons(PHOTON_BYTES);
+                self.renderer = Some(renderer);
+            }
+        }
+        let Some(renderer) = &mut self.renderer else { return };
+        let desk = Desk { outbox: self.outbox, gate: self.gate, wake: self.wake, generation: job.generation };
+        if job.settings.photons > DRAFT_PHOTONS
+            && renderer.passes() == 0
+            && !renderer.has_next_photons()
+            && renderer.draft(DRAFT_PHOTONS, &desk) == Step::Cancelled
+        {
+            return;
+        }
+        while !self.gate.is_stale(job.generation) && renderer.passes() < job.passes && !renderer.films().is_empty() {
+            if renderer.step(&desk) == Step::Cancelled {
+                return;
+            }
+            self.gate.pass_ended();
+            desk.send(Event::PassDone { generation: job.generation, progress: Box::new(progress(renderer)) });
+        }
+        desk.send(Event::Finished { generation: job.generation });
+    }
+}
+
+fn progress(r: &Renderer) -> Progress {
+    Progress {
+        passes: r.films().iter().map(|f| f.passes()).collect(),
+        estimator_seconds: r.estimator_seconds().to_vec(),
+        photon_seconds: r.photon_seconds().to_vec(),
+        seconds: *r.seconds(),
+        emitted: r.emitted(),
+        stored: r.stored(),
+        bounded: *r.bounded(),
+        warnings: r.warnings(),
+    }
+}
+
+/// Where the renderer's threads ask and tell.
+struct Desk<'a> {
+    outbox: &'a Sender<Event>,
+    gate: &'a Gate,
+    wake: &'a Wake,
+    generation: u64,
+}
+
+impl Desk<'_> {
+    /// Waits for room, unless the event has become stale.
+    fn send(&self, event: Event) {
+        let mut event = event;
+        while !self.gate.is_stale(self.generation) {
+            match self.outbox.send_timeout(event, PATIENCE) {
+                Ok(()) => return (self.wake)(),
+                Err(SendTimeoutError::Timeout(back)) => event = back,
+                Err(SendTimeoutError::Disconnected(_)) => return,
+            }
+        }
+    }
+}
+
+impl Watch for Desk<'_> {
+    fn cancelled(&self) -> bool {
+        self.gate.is_stale(self.generation)
+    }
+
+    fn tile_allowed(&self) -> bool {
+        self.gate.pass_tile(self.generation)
+    }
+
+    fn pass_started(&self, pass: &Arc<Pass>, draft: bool) {
+        self.send(Event::PassStarted { generation: self.generation, pass: Arc::clone(pass), draft });
+    }
+
+    fn tile_done(&self, tile: &TileDone) {
+        let images =
+            tile.means().map(|(estimator, pixels, seconds)| TileImage { estimator, pixels, seconds }).collect();
+        self.send(Event::TileDone { generation: self.generation, rect: tile.rect(), images, draft: tile.draft });
+    }
+}
