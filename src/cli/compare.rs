@@ -5,11 +5,13 @@ use crate::cli::failure::Failure;
 use crate::cli::flags::{CommonFlags, rect};
 use crate::cli::progress::{ProgressWatch, bar, interrupted, listen_for_interrupts};
 use crate::cli::table::percent;
+use crate::cli::window::session;
 use crate::cli::{print, to_json};
 use crate::estimate::registry::{self, ESTIMATORS};
 use crate::estimate::regular::Regular;
 use crate::estimate::{Estimator, Lookup};
 use crate::export::report::{CompareReport, EstimatorReport, EstimatorSeconds, PlanCost, RenderReport};
+use crate::export::session::Session;
 use crate::export::sheet::{self, Column, PALETTE, Sheet};
 use crate::export::tone::{auto_exposure, to_srgb};
 use crate::export::{Provenance, exr_file, png_file, whole_file};
@@ -21,7 +23,7 @@ use crate::render::Step;
 use crate::render::film::{Image, Rect};
 use crate::render::photon_pass::PhotonMaps;
 use crate::render::plan::Slot;
-use crate::render::settings::{Gather, LightPart, PlanMode};
+use crate::render::settings::{Gather, LightPart, PlanMode, RenderSettings};
 use crate::render::tiles::tiles;
 use crate::render::view_pass::ViewPass;
 use crate::render::{Plan, Renderer};
@@ -40,7 +42,7 @@ const CROP: [u32; 2] = [128, 96];
 /// Flags of `compare`.
 #[derive(Debug, Args)]
 pub struct CompareArgs {
-    /// A built-in name, a .toml or an .obj
+    /// A built-in name, a .toml, an .obj or a session
     scene: String,
     /// Estimators, separated by commas; all with their defaults if left out
     #[arg(long, value_name = "A,B")]
@@ -48,9 +50,9 @@ pub struct CompareArgs {
     /// Part to enlarge: x,y,width,height; where the estimators disagree most, if left out
     #[arg(long, value_name = "X,Y,W,H", value_parser = rect)]
     crop: Option<Rect>,
-    /// Factor of enlargement, without smoothing
-    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=32))]
-    enlarge: u32,
+    /// Factor of enlargement, without smoothing; 3 if left out
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=32))]
+    enlarge: Option<u32>,
     /// Where errors are taken against regular with 16×16 view rays
     #[arg(long, value_enum, default_value = "crop")]
     truth: Truth,
@@ -79,7 +81,16 @@ enum Truth {
 impl CompareArgs {
     /// The comparison of a scene at its defaults.
     pub fn of(scene: String, flags: CommonFlags) -> Self {
-        Self { scene, estimators: None, crop: None, enlarge: 3, truth: Truth::Crop, reference: None, mask: None, flags }
+        Self {
+            scene,
+            estimators: None,
+            crop: None,
+            enlarge: None,
+            truth: Truth::Crop,
+            reference: None,
+            mask: None,
+            flags,
+        }
     }
 }
 
@@ -94,6 +105,8 @@ pub fn run(args: &CompareArgs) -> Result<(), Failure> {
 
 struct Comparison<'a> {
     args: &'a CompareArgs,
+    crop: Option<Rect>,
+    enlarge: u32,
     renderer: Renderer,
     reference: Option<Reference>,
     /// What was asked for and cannot be, though the rest can.
@@ -106,29 +119,39 @@ impl<'a> Comparison<'a> {
     /// Reads and checks everything that can be wrong before any work is done.
     fn prepare(args: &'a CompareArgs) -> Result<Self, Failure> {
         let start = Instant::now();
-        let scene = open(&args.scene)?;
+        let of_session = Session::is_one(args.scene.as_ref());
         // Here `--estimator` may be a list, like `--estimators`.
-        let settings = CommonFlags { estimator: None, ..args.flags.clone() }.settings(&scene)?;
+        let (session, _) = session(&args.scene, &CommonFlags { estimator: None, ..args.flags.clone() })?;
+        let scene = if of_session { session.open_scene()?.1 } else { open(&args.scene)? };
+        let mut settings = RenderSettings::new(&scene, &session.render, session.size, session.seed)?;
+        settings.plan = args.flags.plan.into();
         if args.estimators.is_some() && args.flags.estimator.is_some() {
             return Err(Failure::Call("--estimator: is in --estimators already; give one of them".into()));
         }
         let estimators = match (&args.estimators, &args.flags.estimator) {
             (Some(list), _) | (None, Some(list)) => registry::estimators(list)?,
+            (None, None) if of_session => session.estimators(),
             (None, None) => ESTIMATORS.iter().filter_map(|e| e.default_estimator()).collect(),
         };
-        if let Some(c) = args.crop {
+        if estimators.is_empty() {
+            return Err(Failure::Call(format!("{}: no panel has an estimator; give --estimators", args.scene)));
+        }
+        let crop = args.crop.or(session.crop_rect());
+        if let Some(c) = crop {
             let fits = |at: u32, length: u32, size: u32| u64::from(at) + u64::from(length) <= u64::from(size);
             let [w, h] = settings.size;
             if !fits(c.x, c.width, w) || !fits(c.y, c.height, h) {
                 return Err(Failure::Call(format!("--crop: leaves the image of {w}x{h} pixels")));
             }
         }
-        let reference = match &args.reference {
-            Some(path) => Some(Reference::from_files(path, args.mask.as_deref()).map_err(Failure::Call)?),
-            None => Reference::built_in(&args.scene).map_err(Failure::Work)?,
+        let given = args.reference.clone().or(session.reference.as_ref().map(PathBuf::from));
+        let mask = if args.reference.is_some() { args.mask.clone() } else { session.mask.as_ref().map(PathBuf::from) };
+        let reference = match &given {
+            Some(path) => Some(Reference::from_files(path, mask.as_deref()).map_err(Failure::Call)?),
+            None => Reference::built_in(&session.scene).map_err(Failure::Work)?,
         };
         let mut notes = Vec::new();
-        let reference = match (reference, &args.reference) {
+        let reference = match (reference, &given) {
             // A reference shows all light; of any other there is no error to speak of.
             (Some(_), _) if settings.light != LightPart::All => {
                 notes.push("a reference shows all light: no error against it without --light all".to_owned());
@@ -150,7 +173,16 @@ impl<'a> Comparison<'a> {
         let truth = [Slot { estimator: &regular, gather: settings.gather }];
         let also: &[Slot] = if args.truth == Truth::None { &[] } else { &truth };
         let renderer = Renderer::planned_for(Arc::new(scene), settings, estimators, also);
-        Ok(Self { args, renderer, reference, notes, start, load })
+        Ok(Self {
+            args,
+            crop,
+            enlarge: args.enlarge.unwrap_or(session.enlarge),
+            renderer,
+            reference,
+            notes,
+            start,
+            load,
+        })
     }
 
     fn run(mut self) -> Result<(), Failure> {
@@ -163,7 +195,7 @@ impl<'a> Comparison<'a> {
             return Err(Failure::Interrupted("nothing was written".into()));
         }
         let images: Vec<Image> = self.renderer.films().iter().map(|f| f.image()).collect();
-        let crop = self.args.crop.unwrap_or_else(|| self.default_crop(&images));
+        let crop = self.crop.unwrap_or_else(|| self.default_crop(&images));
         let truth = self.truth(crop, hidden);
         let plan_cost = if interrupted() { None } else { self.plan_cost() };
         let names = file_names(self.renderer.estimators());
@@ -328,10 +360,10 @@ impl<'a> Comparison<'a> {
         };
         for (name, image) in names.iter().zip(images) {
             both(name, image, 1)?;
-            both(&format!("{name}_crop"), &image.crop(crop), self.args.enlarge)?;
+            both(&format!("{name}_crop"), &image.crop(crop), self.enlarge)?;
         }
         if let Some((_, image)) = truth {
-            both("truth", image, if self.args.truth == Truth::Crop { self.args.enlarge } else { 1 })?;
+            both("truth", image, if self.args.truth == Truth::Crop { self.enlarge } else { 1 })?;
         }
         let sheet = sheet::draw(&self.sheet(images, crop, truth, report, exposure));
         png_file::write(&folder.join("sheet.png"), sheet.size, &sheet.rgb, &provenance)?;
@@ -386,7 +418,7 @@ impl<'a> Comparison<'a> {
             ),
             columns: columns.collect(),
             crop,
-            enlarge: self.args.enlarge,
+            enlarge: self.enlarge,
             exposure,
         }
     }

@@ -56,9 +56,9 @@ pub struct CommonFlags {
     /// Size of the image in pixels, instead of the scene's
     #[arg(long, value_name = "WxH", value_parser = size)]
     pub size: Option<[u32; 2]>,
-    /// Seed of everything random
-    #[arg(long, value_name = "N", default_value_t = 1)]
-    pub seed: u64,
+    /// Seed of everything random; 1 if left out
+    #[arg(long, value_name = "N")]
+    pub seed: Option<u64>,
     /// Threads; all cores if left out
     #[arg(long, value_name = "T")]
     pub threads: Option<usize>,
@@ -83,32 +83,47 @@ pub enum PlanFlag {
     Full,
 }
 
+impl From<PlanFlag> for PlanMode {
+    fn from(flag: PlanFlag) -> Self {
+        match flag {
+            PlanFlag::Needed => Self::Needed,
+            PlanFlag::Full => Self::Full,
+        }
+    }
+}
+
 impl CommonFlags {
+    /// Writes those that were given over `render`.
+    pub fn onto(&self, render: &mut RenderFile) {
+        fn over<T: Clone>(value: &mut Option<T>, flag: &Option<T>) {
+            if flag.is_some() {
+                value.clone_from(flag);
+            }
+        }
+        over(&mut render.photons, &self.photons);
+        over(&mut render.estimator, &self.estimator);
+        over(&mut render.gather, &self.gather);
+        over(&mut render.k, &self.k);
+        over(&mut render.footprint_scale, &self.footprint_scale);
+        over(&mut render.max_depth, &self.max_depth);
+        over(&mut render.split_depth, &self.split_depth);
+        over(&mut render.final_gather, &self.final_gather);
+        over(&mut render.light, &self.light);
+        over(&mut render.direct, &self.direct);
+        over(&mut render.shadow_rays, &self.shadow_rays);
+        over(&mut render.sampling, &self.sampling);
+        over(&mut render.diffuse_spread, &self.diffuse_spread);
+    }
+
     /// The scene's settings with these flags on top.
     ///
     /// # Errors
     /// A value out of range.
     pub fn settings(&self, scene: &Scene) -> Result<RenderSettings, Failure> {
-        let flags = RenderFile {
-            photons: self.photons,
-            estimator: self.estimator.clone(),
-            gather: self.gather.clone(),
-            k: self.k,
-            footprint_scale: self.footprint_scale,
-            max_depth: self.max_depth,
-            split_depth: self.split_depth,
-            final_gather: self.final_gather.clone(),
-            light: self.light.clone(),
-            direct: self.direct.clone(),
-            shadow_rays: self.shadow_rays,
-            sampling: self.sampling.clone(),
-            diffuse_spread: self.diffuse_spread.clone(),
-        };
-        let mut settings = RenderSettings::new(scene, &flags, self.size, self.seed)?;
-        settings.plan = match self.plan {
-            PlanFlag::Needed => PlanMode::Needed,
-            PlanFlag::Full => PlanMode::Full,
-        };
+        let mut flags = RenderFile::default();
+        self.onto(&mut flags);
+        let mut settings = RenderSettings::new(scene, &flags, self.size, self.seed.unwrap_or(1))?;
+        settings.plan = self.plan.into();
         Ok(settings)
     }
 

@@ -8,6 +8,7 @@ pub mod lists;
 pub mod progress;
 pub mod render;
 pub mod table;
+pub mod window;
 
 use clap::{Parser, Subcommand};
 use failure::Failure;
@@ -21,7 +22,7 @@ use std::process::ExitCode;
 struct Cli {
     #[command(subcommand)]
     command: Option<Command>,
-    /// Scene to compare estimators on: a built-in name, a .toml or an .obj
+    /// Opens the workbench on a built-in scene, a .toml, an .obj or a session; without a display it compares instead
     scene: Option<String>,
     #[command(flatten)]
     flags: CommonFlags,
@@ -59,14 +60,7 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
         Some(Command::Render(args)) => render::run(&args),
         Some(Command::Scenes(args)) => lists::scenes(&args),
         Some(Command::Estimators(args)) => lists::estimators(&args),
-        None => {
-            let scene = cli.scene.unwrap_or_else(|| "ring".into());
-            // A scene that can't be opened has its own line.
-            if !cli.flags.quiet && !cli.flags.json && crate::scene::open(&scene).is_ok() {
-                eprintln!("There is no window yet: comparing the estimators on {scene}.");
-            }
-            compare::run(&compare::CompareArgs::of(scene, cli.flags))
-        }
+        None => window::run(cli.scene.unwrap_or_else(|| "ring".into()), cli.flags),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

@@ -4,6 +4,7 @@ pub mod exr_file;
 pub mod png_file;
 pub mod provenance;
 pub mod report;
+pub mod session;
 pub mod sheet;
 pub mod text;
 pub mod tone;

@@ -1,6 +1,7 @@
 //! The pinhole camera.
 
-use glam::Vec3;
+use crate::scene::scene_file::CameraFile;
+use glam::{DVec3, Vec3};
 
 /// A pinhole camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -13,4 +14,91 @@ pub struct Camera {
     pub tan_half_fov_y: f32,
     /// Pixels across and down, as the scene asks.
     pub resolution: [u32; 2],
+}
+
+/// A way to move a camera by hand.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Move {
+    /// About the target.
+    Orbit,
+    /// Camera and target together, in the image plane.
+    Sideways,
+    /// Towards the target.
+    Nearer,
+}
+
+/// Moves a camera by `x` to the right and `y` down, in heights of the image; whether it moved.
+///
+/// An orbit by one height is half a turn, and never goes over the poles; the target stays in the middle.
+pub fn moved(camera: &mut CameraFile, how: Move, x: f64, y: f64) -> bool {
+    let (position, target) = (DVec3::from_array(camera.position), DVec3::from_array(camera.target));
+    let up = DVec3::from_array(camera.up.unwrap_or([0.0, 1.0, 0.0])).normalize_or(DVec3::Y);
+    let offset = position - target;
+    let distance = offset.length();
+    let right = up.cross(offset).normalize_or_zero();
+    if right == DVec3::ZERO || !distance.is_finite() {
+        return false;
+    }
+    match how {
+        Move::Orbit => {
+            let height = (up.dot(offset) / distance).clamp(-1.0, 1.0);
+            let elevation = libm::asin(height);
+            let limit = std::f64::consts::FRAC_PI_2 - 0.01;
+            let to =
+                (elevation + y * std::f64::consts::PI).clamp(-limit.max(elevation.abs()), limit.max(elevation.abs()));
+            let flat = (offset - up * up.dot(offset)).normalize_or_zero();
+            let azimuth = -x * std::f64::consts::PI;
+            let turned = flat * libm::cos(azimuth) + up.cross(flat) * libm::sin(azimuth);
+            camera.position = (target + (turned * libm::cos(to) + up * libm::sin(to)) * distance).to_array();
+        }
+        Move::Sideways => {
+            let height = 2.0 * distance * libm::tan(camera.fov_y.to_radians() / 2.0);
+            let image_up = offset.cross(right).normalize_or_zero();
+            let by = image_up * (y * height) - right * (x * height);
+            camera.position = (position + by).to_array();
+            camera.target = (target + by).to_array();
+        }
+        Move::Nearer => camera.position = (target + offset * libm::exp2(y * 2.0)).to_array(),
+    }
+    true
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn camera() -> CameraFile {
+        CameraFile { position: [0.0, 3.0, 4.0], target: [0.0, 0.0, 0.0], up: None, fov_y: 40.0, resolution: None }
+    }
+
+    #[test]
+    fn orbits_keep_the_distance_and_stay_off_the_poles() {
+        let mut c = camera();
+        for (x, y) in [(0.1, 0.0), (0.3, -0.1), (0.0, 5.0), (0.2, -9.0)] {
+            assert!(moved(&mut c, Move::Orbit, x, y));
+            let p = DVec3::from_array(c.position);
+            assert!((p.length() - 5.0).abs() < 1e-9);
+            assert!(p.y.abs() < 4.9999, "{p}");
+        }
+        let mut c = camera();
+        moved(&mut c, Move::Orbit, 0.5, 0.0);
+        assert!((DVec3::from_array(c.position) - DVec3::new(-4.0, 3.0, 0.0)).length() < 1e-9, "{:?}", c.position);
+    }
+
+    /// A move by one height of the image brings what was at its edge beyond the other.
+    #[test]
+    fn moving_sideways_follows_the_pointer() {
+        let mut c = camera();
+        moved(&mut c, Move::Sideways, 0.0, 1.0);
+        let by = DVec3::from_array(c.target);
+        let height = 2.0 * 5.0 * libm::tan(20f64.to_radians());
+        assert!((by.length() - height).abs() < 1e-9);
+        assert!(by.y > 0.0 && (DVec3::from_array(c.position) - by - DVec3::new(0.0, 3.0, 4.0)).length() < 1e-9);
+    }
+
+    #[test]
+    fn looking_straight_down_does_not_break() {
+        let mut c = CameraFile { position: [0.0, 5.0, 0.0], ..camera() };
+        assert!(!moved(&mut c, Move::Orbit, 0.1, 0.1));
+    }
 }

@@ -6,7 +6,7 @@ use glam::{Vec2, Vec3};
 pub const NONE: u32 = u32::MAX;
 
 /// A sphere with its surface.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sphere {
     /// Centre, metres.
     pub center: Vec3,
@@ -17,7 +17,7 @@ pub struct Sphere {
 }
 
 /// Triangles and spheres. Primitive `i` is triangle `i`, or sphere `i - triangles` beyond them.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Geometry {
     /// Vertices, metres.
     pub positions: Vec<Vec3>,

@@ -21,7 +21,7 @@ pub use error::SceneError;
 pub use geometry::Geometry;
 pub use light::Light;
 pub use material::Material;
-pub use source::open;
+pub use source::{Source, open};
 
 use glam::{DVec3, Vec3};
 use scene_file::RenderFile;

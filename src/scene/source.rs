@@ -3,8 +3,10 @@
 use crate::math::hash::{FNV_START, fnv1a};
 use crate::scene::built_in::{self, BuiltIn};
 use crate::scene::load;
+use crate::scene::scene_file::SceneFile;
 use crate::scene::{Scene, SceneError};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// The files that a scene may name: those beside it, or those of the binary.
 pub enum Files {
@@ -56,32 +58,95 @@ fn read_text(path: &Path) -> Result<String, SceneError> {
     })
 }
 
+/// An opened scene: as it is written, which can be edited, and as it was loaded.
+pub struct Source {
+    /// What the user called it: a built-in name or a path.
+    pub name: String,
+    /// As it is written; for an OBJ, the scene file that frames and lights it.
+    pub file: SceneFile,
+    /// As it was loaded.
+    pub scene: Arc<Scene>,
+    path: PathBuf,
+    text: String,
+    files: Files,
+}
+
+impl Source {
+    /// Opens a scene by its name on the command line.
+    ///
+    /// # Errors
+    /// An unknown name, an unreadable file, or anything wrong in it.
+    pub fn open(name: &str) -> Result<Self, SceneError> {
+        let from_toml = |path: PathBuf, text: String, files: Files| {
+            let file = load::parse(&path, &text)?;
+            let scene = Arc::new(load::scene_from_file(&path, &text, &file, &files)?);
+            Ok(Self { name: name.to_owned(), file, scene, path, text, files })
+        };
+        if let Some(b) = built_in::find(name) {
+            return from_toml(format!("{}.toml", b.name).into(), b.text.to_owned(), Files::BuiltIn(b.files));
+        }
+        let path = Path::new(name);
+        let folder = || Files::Folder(path.parent().unwrap_or(Path::new("")).to_owned());
+        let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("");
+        match extension.to_ascii_lowercase().as_str() {
+            "toml" => from_toml(path.to_owned(), read_text(path)?, folder()),
+            "obj" => {
+                let text = read_text(path)?;
+                let (file, scene) = load::scene_from_obj(path, &text)?;
+                let (path, text, scene) = (path.to_owned(), String::new(), Arc::new(scene));
+                Ok(Self { name: name.to_owned(), file, scene, path, text, files: folder() })
+            }
+            "bsp" | "pk3" => Err(SceneError::Whole {
+                file: path.to_owned(),
+                what: "Quake 3 maps cannot be read yet; convert it to OBJ".into(),
+            }),
+            _ => Err(SceneError::Unknown { name: name.to_owned(), known: built_in::names() }),
+        }
+    }
+
+    /// The scene of an edited file. Where its surfaces are those of `before`, they are the same value in memory.
+    ///
+    /// # Errors
+    /// Anything wrong in it; lines are those of the file as it was opened.
+    pub fn edited(&self, file: &SceneFile, before: &Scene) -> Result<Scene, SceneError> {
+        let mut scene = load::scene_from_file(&self.path, &self.text, file, &self.files)?;
+        scene.hash = self.hash_of_edited(file);
+        if let Some(same) = [&before.geometry, &self.scene.geometry].into_iter().find(|g| ***g == *scene.geometry) {
+            scene.geometry = Arc::clone(same);
+        }
+        Ok(scene)
+    }
+
+    /// The scene `before` with the camera of an edited file, which differs in nothing else.
+    ///
+    /// # Errors
+    /// Anything wrong in the camera.
+    pub fn with_camera(&self, file: &SceneFile, before: &Scene) -> Result<Scene, SceneError> {
+        let camera = load::camera_from_file(&self.path, &self.text, file, &self.files, before.origin)?;
+        Ok(Scene { camera, hash: self.hash_of_edited(file), ..before.clone() })
+    }
+
+    /// Hash of the files as they were opened, and of the edits.
+    fn hash_of_edited(&self, file: &SceneFile) -> u64 {
+        if *file == self.file {
+            return self.scene.hash;
+        }
+        let text = toml::to_string(file).unwrap_or_default();
+        hash_of(&[&format!("{:016x}", self.scene.hash), &text])
+    }
+
+    /// Its file on disk, if it is one.
+    pub fn path(&self) -> Option<&Path> {
+        matches!(self.files, Files::Folder(_)).then_some(self.path.as_path())
+    }
+}
+
 /// Opens a scene by its name on the command line.
 ///
 /// # Errors
 /// An unknown name, an unreadable file, or anything wrong in it.
 pub fn open(name: &str) -> Result<Scene, SceneError> {
-    if let Some(b) = built_in::find(name) {
-        return open_built_in(b);
-    }
-    let path = Path::new(name);
-    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("");
-    match extension.to_ascii_lowercase().as_str() {
-        "toml" => {
-            let text = read_text(path)?;
-            let folder = path.parent().unwrap_or(Path::new("")).to_owned();
-            load::scene_from_toml(path, &text, &Files::Folder(folder))
-        }
-        "obj" => {
-            let text = read_text(path)?;
-            load::scene_from_obj(path, &text)
-        }
-        "bsp" | "pk3" => Err(SceneError::Whole {
-            file: path.to_owned(),
-            what: "Quake 3 maps cannot be read yet; convert it to OBJ".into(),
-        }),
-        _ => Err(SceneError::Unknown { name: name.to_owned(), known: built_in::names() }),
-    }
+    Source::open(name).map(|source| Arc::unwrap_or_clone(source.scene))
 }
 
 /// Opens a scene of the binary.
@@ -89,11 +154,44 @@ pub fn open(name: &str) -> Result<Scene, SceneError> {
 /// # Errors
 /// None but a defect of the binary.
 pub fn open_built_in(b: &BuiltIn) -> Result<Scene, SceneError> {
-    let file = PathBuf::from(format!("{}.toml", b.name));
-    load::scene_from_toml(&file, b.text, &Files::BuiltIn(b.files))
+    open(b.name)
 }
 
 /// Hash of texts in their order.
 pub fn hash_of(texts: &[&str]) -> u64 {
     texts.iter().fold(FNV_START, |h, t| fnv1a(fnv1a(h, t.as_bytes()), &[0]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Every built-in scene written out again loads as the same scene.
+    #[test]
+    fn scene_files_come_back_as_they_were_written() {
+        for b in built_in::BUILT_IN {
+            let source = Source::open(b.name).expect("built in");
+            let text = toml::to_string(&source.file).expect("a text");
+            let again = load::parse(Path::new("again.toml"), &text).expect(&text);
+            assert_eq!(again, source.file, "{}", b.name);
+        }
+    }
+
+    /// Moving a light that has no surface keeps the surfaces in memory; moving one that has makes new ones.
+    #[test]
+    fn edits_keep_what_they_do_not_touch() {
+        let source = Source::open("ring").expect("built in");
+        let mut file = source.file.clone();
+        file.lights[0].position = Some([0.5, 2.0, 0.5]);
+        let edited = source.edited(&file, &source.scene).expect("valid");
+        assert!(Arc::ptr_eq(&edited.geometry, &source.scene.geometry) && edited.hash != source.scene.hash);
+        let soft = Source::open("ring_soft").expect("built in");
+        let mut file = soft.file.clone();
+        file.lights[0].radius = Some(0.05);
+        let edited = soft.edited(&file, &soft.scene).expect("valid");
+        assert!(!Arc::ptr_eq(&edited.geometry, &soft.scene.geometry));
+        file.lights[0].radius = Some(-1.0);
+        let error = soft.edited(&file, &soft.scene).expect_err("negative").to_string();
+        assert!(error.contains("lights[0].radius"), "{error}");
+    }
 }

@@ -1,5 +1,29 @@
 //! The egui application: panels, overlays, inspector, and the thread that renders for them.
 //!
-//! It draws and asks; it holds no rendering code.
+//! It draws and asks; it holds no rendering code. In a frame, data goes one way: events of the worker come into the
+//! [`render::Render`] and the [`gallery::Gallery`]; the panes draw them and edit the session of the
+//! [`document::Document`], or ask for an [`actions::Action`]; at the end the document finds out what the edits ask for,
+//! and a new job goes to the worker.
 
+pub mod actions;
+pub mod analysis;
+pub mod app;
+pub mod bars;
+pub mod desk;
+pub mod dialogs;
+pub mod document;
+pub mod edits;
+pub mod files;
+pub mod gallery;
+pub mod history;
+pub mod layout;
+pub mod messages;
+pub mod overlays;
+pub mod panes;
+pub mod render;
+pub mod theme;
+pub mod viewport;
+pub mod window;
 pub mod worker;
+
+pub use app::Workbench;

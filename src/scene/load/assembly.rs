@@ -1,6 +1,7 @@
 //! All surfaces and lights in f64 as they come from a file, and their move to the local origin.
 
 use crate::math::rgb::Rgb;
+use crate::scene::Camera;
 use crate::scene::Material;
 use crate::scene::geometry::{Geometry, NONE, Sphere};
 use crate::scene::shapes::Mesh;
@@ -13,6 +14,20 @@ pub(super) struct CameraSource {
     pub(super) up: DVec3,
     pub(super) fov_y: f64,
     pub(super) resolution: [u32; 2],
+}
+
+impl CameraSource {
+    /// The camera about a local origin.
+    pub(super) fn local(&self, origin: DVec3) -> Camera {
+        let forward = (self.target - self.position).normalize();
+        let right = forward.cross(self.up).normalize();
+        Camera {
+            position: (self.position - origin).as_vec3(),
+            frame: [right, right.cross(forward), forward].map(|v| v.as_vec3()),
+            tan_half_fov_y: crate::math::elementary::tan(self.fov_y.to_radians() / 2.0) as f32,
+            resolution: self.resolution,
+        }
+    }
 }
 
 /// Lights before they are moved to the local origin.

@@ -7,7 +7,7 @@ mod surfaces;
 
 use crate::math::rgb::Rgb;
 use crate::scene::locate::Locator;
-use crate::scene::scene_file::{AnimateFile, CameraFile, RenderFile, SceneFile, ShapeFile};
+use crate::scene::scene_file::{AnimateFile, CameraFile, LightFile, RenderFile, SceneFile, ShapeFile};
 use crate::scene::source::{Files, hash_of};
 use crate::scene::{Camera, Light, Scene, SceneError};
 use assembly::{Assembly, CameraSource, LightSource, local_geometry};
@@ -29,17 +29,24 @@ type Checked<T> = Result<T, SceneError>;
 /// # Errors
 /// The first thing that is wrong, with file, line and key.
 pub fn scene_from_toml(file: &Path, text: &str, files: &Files) -> Checked<Scene> {
-    let locator = Locator::new(file, text);
-    let parsed: SceneFile = toml::from_str(text).map_err(|e| locator.parse_error(&e))?;
-    let name = parsed.name.clone().unwrap_or_else(|| stem(file));
-    let mut loader = Loader {
-        locator,
-        files,
-        texts: vec![text.to_owned()],
-        assembly: Assembly::default(),
-        material_index: BTreeMap::new(),
-        warnings: Vec::new(),
-    };
+    scene_from_file(file, text, &parse(file, text)?, files)
+}
+
+/// The text of a scene file as it is written.
+///
+/// # Errors
+/// Text that is no TOML, an unknown key or a wrong type, with file and line.
+pub fn parse(file: &Path, text: &str) -> Checked<SceneFile> {
+    toml::from_str(text).map_err(|e| Locator::new(file, text).parse_error(&e))
+}
+
+/// Checks and loads a scene file; `file` and `text` place what is wrong in it.
+///
+/// # Errors
+/// The first thing that is wrong, with file, line and key.
+pub fn scene_from_file(file: &Path, text: &str, parsed: &SceneFile, files: &Files) -> Checked<Scene> {
+    let mut loader = Loader::new(Locator::new(file, text), files);
+    loader.texts.push(text.to_owned());
     loader.materials(&parsed.materials)?;
     for (i, shape) in parsed.shapes.iter().enumerate() {
         loader.shape(&format!("shapes[{i}]"), shape)?;
@@ -51,36 +58,60 @@ pub fn scene_from_toml(file: &Path, text: &str, files: &Files) -> Checked<Scene>
         return Err(loader.locator.error("camera", "there is none; add [camera] with position, target and fov_y"));
     };
     let camera = loader.camera(camera)?;
-    loader.finish(name, &camera, parsed.render)
+    let name = parsed.name.clone().unwrap_or_else(|| stem(file));
+    loader.finish(name, &camera, parsed.render.clone())
 }
 
-/// An OBJ as a scene of its own: a camera that frames it and a point light above the camera's shoulder.
+/// The camera of a scene file, about a local origin that is known.
+///
+/// # Errors
+/// Anything wrong in the camera, with file, line and key.
+pub fn camera_from_file(file: &Path, text: &str, parsed: &SceneFile, files: &Files, origin: DVec3) -> Checked<Camera> {
+    let loader = Loader::new(Locator::new(file, text), files);
+    match &parsed.camera {
+        Some(camera) => Ok(loader.camera(camera)?.local(origin)),
+        None => Err(loader.locator.error("camera", "there is none; add [camera] with position, target and fov_y")),
+    }
+}
+
+/// An OBJ as a scene of its own: a camera that frames it and a point light above the camera's shoulder. Returns the
+/// scene file that says so, and the scene.
 ///
 /// # Errors
 /// Anything wrong in the file.
-pub fn scene_from_obj(file: &Path, text: &str) -> Checked<Scene> {
+pub fn scene_from_obj(file: &Path, text: &str) -> Checked<(SceneFile, Scene)> {
     let name = file.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
     let folder = file.parent().unwrap_or(Path::new("")).to_owned();
     let files = Files::Folder(folder);
-    let mut loader = Loader {
-        locator: Locator::new(file, ""),
-        files: &files,
-        texts: vec![text.to_owned()],
-        assembly: Assembly::default(),
-        material_index: BTreeMap::new(),
-        warnings: Vec::new(),
-    };
+    let mut loader = Loader::new(Locator::new(file, ""), &files);
+    loader.texts.push(text.to_owned());
     let shape = ShapeFile { kind: "mesh".into(), file: Some(name), ..Default::default() };
     loader.shape("mesh", &shape)?;
     let (center, radius) = loader.assembly.bounds();
-    let eye = center + DVec3::new(0.0, 0.9, 2.8) * radius;
-    let camera = CameraSource { position: eye, target: center, up: DVec3::Y, fov_y: 45.0, resolution: [512, 512] };
-    let power = (40.0 * radius * radius) as f32;
-    loader
-        .assembly
-        .lights
-        .push(LightSource::Point { position: center + DVec3::new(-1.6, 2.4, 1.2) * radius, power: Rgb::splat(power) });
-    loader.finish(stem(file), &camera, RenderFile::default())
+    let camera = CameraFile {
+        position: (center + DVec3::new(0.0, 0.9, 2.8) * radius).to_array(),
+        target: center.to_array(),
+        up: None,
+        fov_y: 45.0,
+        resolution: Some([512, 512]),
+    };
+    let light = LightFile {
+        kind: "point".into(),
+        position: Some((center + DVec3::new(-1.6, 2.4, 1.2) * radius).to_array()),
+        power: Some([40.0 * radius * radius; 3]),
+        ..Default::default()
+    };
+    loader.light("lights[0]", &light)?;
+    let source = loader.camera(&camera)?;
+    let written = SceneFile {
+        name: Some(stem(file)),
+        camera: Some(camera),
+        materials: BTreeMap::new(),
+        shapes: vec![shape],
+        lights: vec![light],
+        render: RenderFile::default(),
+    };
+    loader.finish(stem(file), &source, RenderFile::default()).map(|scene| (written, scene))
 }
 
 fn stem(file: &Path) -> String {
@@ -96,7 +127,18 @@ struct Loader<'a> {
     warnings: Vec<String>,
 }
 
-impl Loader<'_> {
+impl<'a> Loader<'a> {
+    fn new(locator: Locator<'a>, files: &'a Files) -> Self {
+        Self {
+            locator,
+            files,
+            texts: Vec::new(),
+            assembly: Assembly::default(),
+            material_index: BTreeMap::new(),
+            warnings: Vec::new(),
+        }
+    }
+
     fn wrong<T>(&self, key: impl Into<String>, what: impl Into<String>) -> Checked<T> {
         Err(self.locator.error(key, what))
     }
@@ -226,8 +268,6 @@ impl Loader<'_> {
                 *radiance,
             ),
         });
-        let forward = (camera.target - camera.position).normalize();
-        let right = forward.cross(camera.up).normalize();
         let texts: Vec<&str> = self.texts.iter().map(String::as_str).collect();
         Ok(Scene {
             name,
@@ -235,12 +275,7 @@ impl Loader<'_> {
             origin,
             center: Vec3::ZERO,
             radius: radius as f32,
-            camera: Camera {
-                position: local(camera.position),
-                frame: [right, right.cross(forward), forward].map(|v| v.as_vec3()),
-                tan_half_fov_y: crate::math::elementary::tan(camera.fov_y.to_radians() / 2.0) as f32,
-                resolution: camera.resolution,
-            },
+            camera: camera.local(origin),
             lights: lights.collect(),
             geometry: geometry.into(),
             materials: self.assembly.materials,

@@ -4,7 +4,9 @@ use super::Wake;
 use super::gate::Gate;
 use super::messages::{Command, Event, Job, Progress, TileImage};
 use crate::estimate::{Estimator, registry};
+use crate::render::film::Rect;
 use crate::render::pass::Pass;
+use crate::render::view_pass::PartSeconds;
 use crate::render::watch::{TileDone, Watch};
 use crate::render::{Renderer, Step};
 use crossbeam_channel::{Receiver, SendTimeoutError, Sender};
@@ -72,6 +74,16 @@ impl Loop<'_> {
         }
         let Some(renderer) = &mut self.renderer else { return };
         let desk = Desk { outbox: self.outbox, gate: self.gate, wake: self.wake, generation: job.generation };
+        // What is kept may have been sent for an older generation and dropped, so it is sent again.
+        for (estimator, film) in renderer.films().iter().enumerate().filter(|(_, f)| f.passes() > 0) {
+            let image = film.image();
+            let images = vec![TileImage { estimator, pixels: image.pixels, seconds: PartSeconds::default() }];
+            let rect = Rect::whole(image.size);
+            desk.send(Event::TileDone { generation: job.generation, rect, images, draft: false });
+        }
+        if renderer.films().iter().any(|f| f.passes() > 0) {
+            desk.send(Event::PassDone { generation: job.generation, progress: Box::new(progress(renderer)) });
+        }
         if job.settings.photons > DRAFT_PHOTONS
             && renderer.passes() == 0
             && !renderer.has_next_photons()

@@ -1,0 +1,386 @@
+//! The window: one frame from the worker's events to the next job.
+
+use super::actions::{self, Action};
+use super::analysis::Analysis;
+use super::desk::{Desk, Finding, Kind, Step};
+use super::document::{Change, Document, Opened};
+use super::gallery::Gallery;
+use super::layout::{self, Pane};
+use super::messages::Messages;
+use super::panes::Panes;
+use super::render::Render;
+use super::worker::Wake;
+use super::{bars, dialogs, theme};
+use crate::export::session::Session;
+use crate::measure::Reference;
+use egui_tiles::Tree;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// The application.
+pub struct Workbench {
+    pub(super) document: Document,
+    pub(super) render: Render,
+    pub(super) gallery: Gallery,
+    pub(super) messages: Messages,
+    pub(super) desk: Desk,
+    pub(super) analysis: Analysis<Kind, Finding>,
+    pub(super) tree: Tree<Pane>,
+    context: egui::Context,
+    /// Passes whose errors have been asked for.
+    measured: u64,
+    styled: bool,
+}
+
+impl Workbench {
+    /// A window on a session whose scene has been opened; `path` is the session's own file.
+    ///
+    /// # Errors
+    /// If the system has no room for a thread.
+    pub fn new(context: &egui::Context, opened: Opened, path: Option<PathBuf>) -> std::io::Result<Self> {
+        let wake: Wake = {
+            let context = context.clone();
+            Arc::new(move || context.request_repaint())
+        };
+        let document = Document::new(opened, path);
+        let tree = document
+            .session
+            .layout
+            .as_deref()
+            .and_then(layout::from_text)
+            .unwrap_or_else(|| layout::standard(document.session.panels.len()));
+        let mut workbench = Self {
+            analysis: Analysis::start(Arc::clone(&wake))?,
+            render: Render::new(wake),
+            gallery: Gallery::default(),
+            messages: Messages::default(),
+            desk: Desk::default(),
+            tree,
+            document,
+            context: context.clone(),
+            measured: 0,
+            styled: false,
+        };
+        workbench.new_scene();
+        workbench.restart();
+        Ok(workbench)
+    }
+
+    /// Draws a frame and does what the user asks in it.
+    pub fn ui(&mut self, ui: &mut egui::Ui) {
+        if !self.styled {
+            theme::apply(ui.ctx());
+            self.styled = true;
+        }
+        self.take_in();
+        for action in actions::pressed(ui.ctx()) {
+            self.desk.ask(action);
+        }
+        self.desk.flipped = ui.input(|i| i.key_down(egui::Key::B)) && !ui.ctx().text_edit_focused();
+        self.desk.unfinished = false;
+        self.desk.hover = None;
+        layout::fit(&mut self.tree, self.document.session.panels.len());
+        bars::top(ui, &self.document, &self.render, &mut self.desk);
+        let (document, gallery) = (&self.document, &self.gallery);
+        bars::status(ui, document, gallery, &self.render, &self.messages, &mut self.desk, &mut self.tree);
+        egui::CentralPanel::default().frame(egui::Frame::new().fill(theme::SURROUND)).show(ui, |ui| {
+            let mut panes = Panes {
+                document: &mut self.document,
+                render: &self.render,
+                gallery: &mut self.gallery,
+                messages: &mut self.messages,
+                desk: &mut self.desk,
+                started: std::time::Instant::now(),
+            };
+            match panes.desk.maximized {
+                Some(panel) if panel < panes.document.session.panels.len() => panes.image_alone(ui, panel),
+                _ => self.tree.ui(&mut panes, ui),
+            }
+        });
+        dialogs::show(ui.ctx(), &mut self.document, &mut self.desk);
+        self.take_dropped(ui.ctx());
+        self.act();
+        let held = ui.input(|i| i.pointer.any_down());
+        let change = self.document.settle(held);
+        self.follow(change, Step::New);
+        if self.desk.unfinished {
+            ui.ctx().request_repaint();
+        }
+    }
+
+    /// Takes in what the threads tell.
+    fn take_in(&mut self) {
+        self.render.poll(&mut self.gallery, &mut self.messages);
+        while let Some(found) = self.analysis.poll() {
+            match found {
+                Ok(finding) => self.found(finding),
+                Err(why) => self.messages.error(why),
+            }
+        }
+        if self.render.passes_seen != self.measured {
+            self.measured = self.render.passes_seen;
+            self.after_pass();
+        }
+    }
+
+    fn found(&mut self, finding: Finding) {
+        match finding {
+            Finding::Opened(opened, step) => match *opened {
+                Ok(opened) => {
+                    match step {
+                        Step::New => self.document.install(opened),
+                        Step::Taken => self.document.install_step(opened),
+                        Step::Document(path) => {
+                            self.document = Document::new(opened, path);
+                            if let Some(tree) = self.document.session.layout.as_deref().and_then(layout::from_text) {
+                                self.tree = tree;
+                            }
+                        }
+                    }
+                    self.new_scene();
+                    self.restart();
+                }
+                Err(why) => {
+                    self.document.stay();
+                    self.messages.error(why);
+                }
+            },
+            Finding::Reference(Ok(reference)) => {
+                self.desk.reference = reference.map(Arc::new);
+                self.after_pass();
+            }
+            Finding::Reference(Err(why)) => self.messages.error(why),
+            Finding::Image(path, Ok(image)) => self.gallery.put_file(&path, image),
+            Finding::Image(_, Err(why)) => self.messages.error(why),
+            Finding::Errors(generation, errors) => {
+                if self.render.job().is_some_and(|j| j.generation == generation) {
+                    for (estimator, point) in errors {
+                        let curve = self.desk.errors.entry(estimator).or_default();
+                        if curve.last().is_none_or(|last| last.passes < point.passes) {
+                            curve.push(point);
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    /// What has to be looked at afresh when the scene is another one.
+    fn new_scene(&mut self) {
+        self.desk.reference = None;
+        let session = &self.document.session;
+        let (scene, reference, mask) = (session.scene.clone(), session.reference.clone(), session.mask.clone());
+        self.analysis.ask(Kind::Reference, move || {
+            Finding::Reference(match reference {
+                Some(path) => Reference::from_files(path.as_ref(), mask.as_ref().map(|m| m.as_ref())).map(Some),
+                None => Reference::built_in(&scene),
+            })
+        });
+    }
+
+    /// Sends a new job for the document as it is.
+    fn restart(&mut self) {
+        self.desk.errors.clear();
+        let job = self.document.job(self.render.next_generation());
+        self.render.start(job, &mut self.gallery, &mut self.messages);
+    }
+
+    /// Does what a change of the session asks for.
+    fn follow(&mut self, change: Result<Change, String>, step: Step) {
+        match change {
+            Ok(Change::None | Change::Look) => {}
+            Ok(Change::Render) => self.restart(),
+            Ok(Change::Scene) => {
+                if !self.analysis.is_busy_with(&Kind::Open) {
+                    let session = self.document.session.clone();
+                    self.open(session, step);
+                }
+            }
+            Err(why) => self.messages.error(why),
+        }
+    }
+
+    pub(super) fn open(&mut self, session: Session, step: Step) {
+        self.analysis.ask(Kind::Open, move || Finding::Opened(Box::new(Opened::new(session)), step));
+    }
+
+    /// Exposure, and errors against the reference.
+    fn after_pass(&mut self) {
+        let panels = &self.document.session.panels;
+        let shown = panels.iter().rev().filter_map(|p| self.gallery.of(p)).find(|i| i.has_pixels());
+        if let Some(image) = shown {
+            let exposure = crate::export::tone::auto_exposure(image.image()).log2();
+            // A small step would only make the images flicker.
+            if (exposure - self.desk.auto_exposure).abs() > 0.1 {
+                self.desk.auto_exposure = exposure;
+            }
+        }
+        let (Some(reference), Some(progress), Some(job)) =
+            (self.desk.reference.clone(), &self.render.progress, self.render.job())
+        else {
+            return;
+        };
+        if job.settings.light != crate::render::LightPart::All {
+            return;
+        }
+        let mut images = Vec::new();
+        for (i, name) in job.estimators.iter().enumerate() {
+            let (Some(&passes), Some(live)) = (progress.passes.get(i), self.gallery.of_estimator(name)) else {
+                continue;
+            };
+            if passes > 0 && self.desk.error_of(name).is_none_or(|e| e.passes < passes) {
+                let seconds = progress.photon_seconds[i] + progress.estimator_seconds[i].total();
+                images.push((name.clone(), passes, seconds, live.image().clone()));
+            }
+        }
+        let generation = job.generation;
+        self.analysis.ask(Kind::Errors, move || {
+            let points = images.into_iter().filter_map(|(name, passes, seconds, image)| {
+                let error = reference.error_of(&image).ok()?;
+                Some((name, super::desk::ErrorPoint { passes, seconds, error }))
+            });
+            Finding::Errors(generation, points.collect())
+        });
+    }
+
+    /// Opens files that were dropped onto the window.
+    fn take_dropped(&mut self, context: &egui::Context) {
+        let dropped = context.input(|i| i.raw.dropped_files.clone());
+        for file in dropped {
+            self.desk.ask(Action::OpenFile(file.path().to_string_lossy().into_owned()));
+        }
+    }
+
+    /// Does what was asked for in this frame.
+    fn act(&mut self) {
+        for action in std::mem::take(&mut self.desk.actions) {
+            self.run(action);
+        }
+    }
+
+    /// Does one action.
+    pub fn run(&mut self, action: Action) {
+        let context = self.context.clone();
+        match action {
+            Action::Undo | Action::Redo => {
+                if action == Action::Undo {
+                    self.document.undo()
+                } else {
+                    self.document.redo()
+                }
+                let change = self.document.settle_step();
+                self.follow(change, Step::Taken);
+            }
+            Action::Pause => {
+                if let Some(gate) = self.render.gate() {
+                    if gate.is_paused() { gate.resume() } else { gate.pause() }
+                }
+            }
+            Action::StepTile => self.render.gate().into_iter().for_each(super::worker::gate::Gate::step_tile),
+            Action::StepPass => self.render.gate().into_iter().for_each(super::worker::gate::Gate::step_pass),
+            Action::RestartWorker => self.render.restart(&mut self.gallery, &mut self.messages),
+            Action::Quit => context.send_viewport_cmd(egui::ViewportCommand::Close),
+            Action::RemovePanel(index) if index < self.document.session.panels.len() => {
+                self.document.session.panels.remove(index);
+                layout::remove_image(&mut self.tree, index);
+                self.desk.maximized = None;
+            }
+            Action::ResetLayout => {
+                self.tree = layout::standard(self.document.session.panels.len());
+                self.desk.maximized = None;
+            }
+            Action::DismissMessages => self.messages.clear(),
+            Action::CopyReadout => {
+                if let Some(text) = bars::readout(&self.document, &self.gallery, &self.desk) {
+                    context.copy_text(text);
+                    self.messages.note("copied the readout");
+                }
+            }
+            other => self.run_file(other),
+        }
+    }
+
+    /// Does an action that concerns files, or hands it to those that only edit.
+    fn run_file(&mut self, action: Action) {
+        match action {
+            Action::OpenScene(name) => {
+                let session = self.document.session.clone();
+                self.open(super::files::session_for(&session, &name), Step::New);
+            }
+            Action::OpenFile(path) => self.open_file(&path),
+            Action::OpenDialog => self.open_dialog(),
+            Action::SaveSession => self.save_session(false),
+            Action::SaveSessionAs => self.save_session(true),
+            Action::SaveSessionTo(path) => self.save_session_to(path.as_ref()),
+            Action::SaveScene => self.save_scene(),
+            Action::SaveSceneTo(path) => self.save_scene_to(path.as_ref()),
+            Action::Export => self.export(),
+            Action::ExportTo(folder) => self.export_to(folder.as_ref()),
+            Action::Reload => {
+                if let Err(why) = self.document.reload() {
+                    self.messages.error(why);
+                } else {
+                    self.new_scene();
+                    self.restart();
+                }
+            }
+            other => super::edits::apply(&other, &mut self.document.session, &mut self.desk, &self.gallery),
+        }
+    }
+
+    /// Takes up how the window was when it was closed, unless the session says otherwise.
+    pub fn recall(&mut self, storage: &dyn eframe::Storage) {
+        if self.document.session.layout.is_none()
+            && let Some(tree) = storage.get_string("layout").as_deref().and_then(layout::from_text)
+        {
+            self.tree = tree;
+        }
+    }
+
+    /// The session, for tests and for saving.
+    pub fn session(&self) -> &Session {
+        &self.document.session
+    }
+
+    /// The document.
+    pub fn document(&self) -> &Document {
+        &self.document
+    }
+
+    /// Messages that have not been dismissed.
+    pub fn messages(&self) -> &Messages {
+        &self.messages
+    }
+
+    /// The render.
+    pub fn render(&self) -> &Render {
+        &self.render
+    }
+
+    /// The images.
+    pub fn gallery(&self) -> &Gallery {
+        &self.gallery
+    }
+
+    /// What is known beyond the session.
+    pub fn desk(&self) -> &Desk {
+        &self.desk
+    }
+
+    /// Whether nothing is left to be done: all passes are rendered and the analysis thread rests.
+    pub fn is_idle(&self) -> bool {
+        self.render.finished && !self.analysis.is_busy() && !self.desk.unfinished
+    }
+}
+
+impl eframe::App for Workbench {
+    fn ui(&mut self, ui: &mut egui::Ui, _frame: &mut eframe::Frame) {
+        Self::ui(self, ui);
+    }
+
+    fn save(&mut self, storage: &mut dyn eframe::Storage) {
+        if let Some(text) = layout::to_text(&self.tree) {
+            storage.set_string("layout", text);
+        }
+    }
+}

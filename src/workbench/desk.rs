@@ -1,0 +1,102 @@
+//! What the window knows beyond the session: the pointer, open dialogs, findings of the analysis thread.
+
+use super::actions::Action;
+use super::dialogs::Dialogs;
+use crate::measure::{ErrorMetrics, Reference};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// A kind of work for the analysis thread.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// Open a scene.
+    Open,
+    /// Read a reference.
+    Reference,
+    /// Read an image.
+    Image(String),
+    /// Errors of all panels.
+    Errors,
+}
+
+/// What the analysis thread has found.
+pub enum Finding {
+    /// A scene for a session, or why there is none; whether it is a step of the history.
+    Opened(Box<Result<super::document::Opened, String>>, Step),
+    /// The reference that belongs to a session's scene, if there is one.
+    Reference(Result<Option<Reference>, String>),
+    /// An image from a file.
+    Image(String, Result<crate::render::film::Image, String>),
+    /// Errors by estimator, of a generation.
+    Errors(u64, Vec<(String, ErrorPoint)>),
+}
+
+/// How a scene that was opened comes into the history.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Step {
+    /// As a new step.
+    New,
+    /// It is a step back or forth.
+    Taken,
+    /// As a new document, with the session's file.
+    Document(Option<std::path::PathBuf>),
+}
+
+/// An error at a time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ErrorPoint {
+    /// Passes.
+    pub passes: u32,
+    /// Seconds of photons, maps and this estimator's view passes.
+    pub seconds: f64,
+    /// The error against the reference.
+    pub error: ErrorMetrics,
+}
+
+/// What lies under the pointer.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hover {
+    /// Number of the panel.
+    pub panel: usize,
+    /// The pixel.
+    pub pixel: [u32; 2],
+    /// Place in the image, pixels.
+    pub at: [f32; 2],
+}
+
+/// State of the window that is not saved.
+#[derive(Default)]
+pub struct Desk {
+    /// What lies under the pointer.
+    pub hover: Option<Hover>,
+    /// Dialogs.
+    pub dialogs: Dialogs,
+    /// A panel that fills the middle.
+    pub maximized: Option<usize>,
+    /// Whether the key of the other side is held.
+    pub flipped: bool,
+    /// Whether a rectangle is to be dragged, and where it began.
+    pub crop_drag: Option<Option<[u32; 2]>>,
+    /// Exposure by the images, stops.
+    pub auto_exposure: f32,
+    /// What panels are compared with by default.
+    pub reference: Option<Arc<Reference>>,
+    /// Error curves by estimator.
+    pub errors: BTreeMap<String, Vec<ErrorPoint>>,
+    /// What the user asked for in this frame.
+    pub actions: Vec<Action>,
+    /// Whether what the panes show needs more frames to be brought up to date.
+    pub unfinished: bool,
+}
+
+impl Desk {
+    /// Asks for an action at the end of the frame.
+    pub fn ask(&mut self, action: Action) {
+        self.actions.push(action);
+    }
+
+    /// The last error of an estimator.
+    pub fn error_of(&self, estimator: &str) -> Option<ErrorPoint> {
+        self.errors.get(estimator)?.last().copied()
+    }
+}

@@ -1,0 +1,80 @@
+//! The images behind the panels: linear radiance as it streams in, and the textures that show it.
+
+pub mod image;
+pub mod shade;
+pub mod texture;
+
+use crate::export::session::Panel;
+use crate::render::film::{Image, Rect};
+use crate::workbench::worker::messages::{Job, TileImage};
+use image::LiveImage;
+use std::collections::BTreeMap;
+use texture::PanelTexture;
+
+/// All images, by what they show.
+#[derive(Default)]
+pub struct Gallery {
+    estimators: Vec<String>,
+    /// By estimator with settings.
+    rendered: BTreeMap<String, LiveImage>,
+    /// By path.
+    files: BTreeMap<String, LiveImage>,
+    /// One for each panel.
+    pub textures: Vec<PanelTexture>,
+}
+
+impl Gallery {
+    /// Gets ready for a job: images of estimators that it has age, others go.
+    pub fn start(&mut self, job: &Job) {
+        self.estimators.clone_from(&job.estimators);
+        let mut before = std::mem::take(&mut self.rendered);
+        for name in &job.estimators {
+            let old = before.remove(name).filter(|i| i.size() == job.settings.size);
+            let mut image = old.unwrap_or_else(|| LiveImage::new(job.settings.size));
+            image.age();
+            self.rendered.insert(name.clone(), image);
+        }
+    }
+
+    /// Takes in a tile of all estimators that it has.
+    pub fn tile(&mut self, rect: Rect, images: &[TileImage]) {
+        for tile in images {
+            let image = self.estimators.get(tile.estimator).and_then(|name| self.rendered.get_mut(name));
+            if let Some(image) = image {
+                image.put(rect, &tile.pixels);
+            }
+        }
+    }
+
+    /// Notes how many passes each estimator has.
+    pub fn passes(&mut self, passes: &[u32]) {
+        for (name, n) in self.estimators.iter().zip(passes) {
+            if let Some(image) = self.rendered.get_mut(name) {
+                image.passes = *n;
+            }
+        }
+    }
+
+    /// Takes in an image from a file.
+    pub fn put_file(&mut self, path: &str, image: Image) {
+        self.files.insert(path.to_owned(), LiveImage::whole(image));
+    }
+
+    /// Whether that file's image is here.
+    pub fn has_file(&self, path: &str) -> bool {
+        self.files.contains_key(path)
+    }
+
+    /// The image of a panel.
+    pub fn of(&self, panel: &Panel) -> Option<&LiveImage> {
+        match &panel.image {
+            Some(path) => self.files.get(path),
+            None => self.rendered.get(&panel.estimator),
+        }
+    }
+
+    /// The image of an estimator.
+    pub fn of_estimator(&self, name: &str) -> Option<&LiveImage> {
+        self.rendered.get(name)
+    }
+}

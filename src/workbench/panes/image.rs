@@ -1,0 +1,278 @@
+//! An image panel: one estimator's image, linked with all the others.
+
+use super::Panes;
+use crate::export::session::{Curve, Mode, Panel, Tone};
+use crate::export::tone::SrgbTable;
+use crate::workbench::actions::Action;
+use crate::workbench::desk::Hover;
+use crate::workbench::gallery::image::{LiveImage, Tile};
+use crate::workbench::gallery::shade::Shade;
+use crate::workbench::theme::{self, mono};
+use crate::workbench::viewport::Viewport;
+use egui::{Align2, Color32, FontId, Rect, Sense, Stroke, Ui, pos2, vec2};
+use std::sync::LazyLock;
+
+static SRGB: LazyLock<SrgbTable> = LazyLock::new(SrgbTable::new);
+
+/// Height of the line above an image, points.
+const HEADER: f32 = 20.0;
+
+/// What a panel shows, in words.
+pub(super) fn title(panel: &Panel) -> String {
+    let name = match &panel.image {
+        Some(path) => std::path::Path::new(path).file_name().map_or(path.clone(), |n| n.to_string_lossy().into_owned()),
+        None => panel.estimator.clone(),
+    };
+    match &panel.heatmap {
+        Some(heatmap) => format!("{name} [{heatmap}]"),
+        None => name,
+    }
+}
+
+/// Draws panel `index`; whether its header is dragged, which moves the panel.
+pub(super) fn show(panes: &mut Panes, ui: &mut Ui, index: usize) -> bool {
+    let Some(panel) = panes.document.session.panels.get(index).cloned() else { return false };
+    let all = ui.available_rect_before_wrap();
+    let (header, body) = all.split_top_bottom_at_y(all.top() + HEADER);
+    let dragged = show_header(panes, ui, index, &panel, header);
+    let response = ui.interact(body, ui.scope_id().with(("image", index)), Sense::click_and_drag());
+    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, format!("Image of {}", title(&panel))));
+    ui.painter().rect_filled(body, 0.0, theme::SURROUND);
+    let size = panes.gallery.of(&panel).map(LiveImage::size);
+    let Some(size) = size else {
+        ui.painter().text(body.center(), Align2::CENTER_CENTER, "no image", FontId::proportional(14.0), Color32::GRAY);
+        return dragged;
+    };
+    let viewport = Viewport::new(panes.document.session.view, body, size);
+    draw(panes, ui, index, &panel, &viewport);
+    navigate(panes, ui, index, &viewport, &response);
+    dragged
+}
+
+fn show_header(panes: &mut Panes, ui: &mut Ui, index: usize, panel: &Panel, rect: Rect) -> bool {
+    let names: Vec<&str> = panes.document.session.panels.iter().map(|p| p.estimator.as_str()).collect();
+    let color = theme::panel_color(&names, index);
+    let response = ui.interact(rect, ui.scope_id().with(("header", index)), Sense::click_and_drag());
+    ui.painter().rect_filled(rect, 0.0, Color32::from_gray(34));
+    ui.painter().rect_filled(Rect::from_min_size(rect.min, vec2(4.0, rect.height())), 0.0, color);
+    let mut right = String::new();
+    if let Some(image) = panes.gallery.of(panel) {
+        if panel.image.is_none() {
+            right = format!("{} passes", image.passes);
+        }
+        if let Some(e) = panes.desk.error_of(&panel.estimator).filter(|_| panel.image.is_none()) {
+            right = format!("err {:.2} %   {right}", 100.0 * e.error.relative_rmse);
+        }
+    }
+    let font = FontId::monospace(12.0);
+    let right_rect = ui.painter().text(
+        rect.right_center() - vec2(6.0, 0.0),
+        Align2::RIGHT_CENTER,
+        &right,
+        font.clone(),
+        Color32::from_gray(190),
+    );
+    let clip = Rect::from_min_max(rect.min, pos2(right_rect.left() - 8.0, rect.bottom()));
+    ui.painter().with_clip_rect(clip).text(
+        rect.left_center() + vec2(10.0, 0.0),
+        Align2::LEFT_CENTER,
+        title(panel),
+        font,
+        Color32::from_gray(225),
+    );
+    if response.double_clicked() {
+        panes.desk.ask(Action::Maximize(index));
+    }
+    response.context_menu(|ui| {
+        if ui.button("Fill the middle").clicked() {
+            panes.desk.ask(Action::Maximize(index));
+            ui.close();
+        }
+        if ui.button("Compare the others with this").clicked() {
+            panes.desk.ask(Action::CompareWith(Some(index)));
+            ui.close();
+        }
+        if ui.button("Remove").clicked() {
+            panes.desk.ask(Action::RemovePanel(index));
+            ui.close();
+        }
+    });
+    response.clone().on_hover_ui(|ui| {
+        ui.label(mono(title(panel)));
+        ui.weak("relative RMSE against the reference; drag to dock it elsewhere, double click to fill the middle");
+    });
+    response.drag_started()
+}
+
+/// Brings the panel's texture up to date and draws it with what lies over it.
+fn draw(panes: &mut Panes, ui: &mut Ui, index: usize, panel: &Panel, viewport: &Viewport) {
+    let painter = ui.painter().with_clip_rect(viewport.panel);
+    update_texture(panes, ui.ctx(), index, panel);
+    let session = &panes.document.session;
+    let other = session.comparison.with.unwrap_or(usize::MAX);
+    let whole = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
+    let texture = |i: usize| panes.gallery.textures.get(i).and_then(|t| t.id());
+    let own = if panes.desk.flipped { texture(other).or(texture(index)) } else { texture(index) };
+    if let Some(id) = own {
+        painter.image(id, viewport.image(), whole, Color32::WHITE);
+    }
+    if session.comparison.mode == Mode::Split
+        && let Some(id) = texture(other)
+    {
+        let divider = session.comparison.divider.clamp(0.0, 1.0);
+        let mut right = viewport.image();
+        right.min.x = viewport.image().left() + viewport.image().width() * divider;
+        painter.image(id, right, Rect::from_min_max(pos2(divider, 0.0), pos2(1.0, 1.0)), Color32::WHITE);
+        painter.vline(right.left(), viewport.image().y_range(), Stroke::new(1.0, Color32::WHITE));
+    }
+    if let Some(image) = panes.gallery.of(panel) {
+        for (rect, tile, _) in image.tiles().filter(|t| t.1 == Tile::Stale) {
+            debug_assert!(tile == Tile::Stale);
+            let min = viewport.to_screen(rect.x as f32, rect.y as f32);
+            let max = viewport.to_screen((rect.x + rect.width) as f32, (rect.y + rect.height) as f32);
+            painter.rect_filled(Rect::from_min_max(min, max), 0.0, theme::STALE);
+        }
+    }
+    for (i, pin) in session.pins.iter().enumerate() {
+        let last = i + 1 == session.pins.len();
+        let rect = Rect::from_min_max(
+            viewport.to_screen(pin[0] as f32, pin[1] as f32),
+            viewport.to_screen((pin[0] + 1) as f32, (pin[1] + 1) as f32),
+        );
+        let color = if last { Color32::WHITE } else { Color32::from_gray(170) };
+        let rect = rect.expand((4.0 - rect.width() / 2.0).max(1.0));
+        painter.rect_stroke(rect, 0.0, Stroke::new(3.0, Color32::BLACK), egui::StrokeKind::Outside);
+        painter.rect_stroke(rect, 0.0, Stroke::new(1.0, color), egui::StrokeKind::Outside);
+    }
+    if let Some([x, y, w, h]) = session.crop {
+        let min = viewport.to_screen(x as f32, y as f32);
+        let max = viewport.to_screen((x + w) as f32, (y + h) as f32);
+        painter.rect_stroke(
+            Rect::from_min_max(min, max),
+            0.0,
+            Stroke::new(1.0, Color32::from_rgb(255, 220, 90)),
+            egui::StrokeKind::Outside,
+        );
+    }
+}
+
+fn update_texture(panes: &mut Panes, context: &egui::Context, index: usize, panel: &Panel) {
+    if panes.gallery.textures.len() <= index {
+        panes.gallery.textures.resize_with(index + 1, Default::default);
+    }
+    let late = panes.is_late();
+    let tone = &panes.document.session.tone;
+    let exposure = if tone.auto { panes.desk.auto_exposure } else { tone.exposure };
+    let shade = Shade::new(tone, exposure);
+    let key = key_of(panel, tone, exposure);
+    let mut texture = std::mem::take(&mut panes.gallery.textures[index]);
+    if let Some(image) = panes.gallery.of(panel) {
+        let started = panes.started;
+        let enough = || late || started.elapsed() > super::TEXTURE_TIME;
+        let color = |x: u32, y: u32| shade.color(&SRGB, image.image().at(x, y));
+        if texture.update(context, image, key, color, enough) {
+            panes.desk.unfinished = true;
+        }
+    }
+    panes.gallery.textures[index] = texture;
+}
+
+/// A number that differs when anything that decides a panel's colours differs.
+fn key_of(panel: &Panel, tone: &Tone, exposure: f32) -> u64 {
+    let curve = match tone.curve {
+        Curve::Srgb => 0u8,
+        Curve::Gamma => 1,
+        Curve::Linear => 2,
+        Curve::Reinhard => 3,
+    };
+    let text = format!("{panel:?} {} {} {curve}", exposure.to_bits(), tone.offset.to_bits());
+    crate::math::hash::fnv1a(crate::math::hash::FNV_START, text.as_bytes())
+}
+
+/// Zoom, pan, pins and the crop.
+fn navigate(panes: &mut Panes, ui: &mut Ui, index: usize, viewport: &Viewport, response: &egui::Response) {
+    let pointer = response.hover_pos();
+    if let Some(at) = pointer
+        && let Some(pixel) = viewport.pixel(at)
+    {
+        let place = viewport.to_image(at);
+        panes.desk.hover = Some(Hover { panel: index, pixel, at: [place.x, place.y] });
+    }
+    let session = &mut panes.document.session;
+    if let Some(at) = pointer {
+        let (scroll, pinch) = ui.input(|i| (i.smooth_scroll_delta().y, i.zoom_delta()));
+        let factor = (scroll / 200.0).exp2() * pinch;
+        if factor != 1.0 {
+            session.view = viewport.zoomed(factor, at);
+        }
+    }
+    if response.double_clicked() {
+        panes.desk.ask(Action::Maximize(index));
+        return;
+    }
+    let at = response.interact_pointer_pos();
+    if panes.desk.crop_drag.is_some() {
+        if let Some(at) = at {
+            drag_crop(panes, viewport, response, at);
+        }
+        return;
+    }
+    if response.dragged_by(egui::PointerButton::Primary) {
+        let split = session.comparison.mode == Mode::Split && session.comparison.with.is_some();
+        if split && let Some(at) = at {
+            session.comparison.divider = ((at.x - viewport.image().left()) / viewport.image().width()).clamp(0.0, 1.0);
+        } else {
+            session.view = viewport.panned(response.drag_delta());
+        }
+    }
+    if response.dragged_by(egui::PointerButton::Middle) {
+        session.view = viewport.panned(response.drag_delta());
+    }
+    if response.dragged_by(egui::PointerButton::Secondary) {
+        let held = ui.input(|i| i.modifiers);
+        orbit(panes, response.drag_delta() / viewport.panel.height().max(1.0), held);
+    }
+    if response.clicked()
+        && let Some(pixel) = at.and_then(|at| viewport.pixel(at))
+    {
+        panes.desk.ask(Action::Pin(pixel));
+    }
+}
+
+fn drag_crop(panes: &mut Panes, viewport: &Viewport, response: &egui::Response, at: egui::Pos2) {
+    let place = viewport.to_image(at);
+    let [w, h] = panes.document.settings().size;
+    let inside = |x: f32, n: u32| (x.max(0.0) as u32).min(n.saturating_sub(1));
+    let pixel = [inside(place.x, w), inside(place.y, h)];
+    let start = match panes.desk.crop_drag {
+        Some(Some(start)) if !response.drag_started() => start,
+        _ => pixel,
+    };
+    if response.dragged() || response.drag_started() {
+        panes.desk.crop_drag = Some(Some(start));
+        let low = [start[0].min(pixel[0]), start[1].min(pixel[1])];
+        let high = [start[0].max(pixel[0]), start[1].max(pixel[1])];
+        panes.document.session.crop = Some([low[0], low[1], high[0] - low[0] + 1, high[1] - low[1] + 1]);
+    }
+    if response.drag_stopped() {
+        panes.desk.crop_drag = None;
+    }
+}
+
+/// Turns the camera about its target, moves both sideways with Shift, or comes nearer with Ctrl. `delta` is in heights
+/// of the panel.
+fn orbit(panes: &mut Panes, delta: egui::Vec2, held: egui::Modifiers) {
+    let Some(mut camera) = panes.document.scene_file().camera else { return };
+    let held = if held.shift {
+        crate::scene::camera::Move::Sideways
+    } else if held.command {
+        crate::scene::camera::Move::Nearer
+    } else {
+        crate::scene::camera::Move::Orbit
+    };
+    if delta != egui::Vec2::ZERO
+        && crate::scene::camera::moved(&mut camera, held, f64::from(delta.x), f64::from(delta.y))
+    {
+        panes.document.session.camera = Some(camera);
+    }
+}
