@@ -2,6 +2,7 @@
 
 use super::actions::{self, Action};
 use super::analysis::Analysis;
+use super::areas::Areas;
 use super::desk::{Desk, Finding, Kind, Step};
 use super::document::{Change, Document, Opened};
 use super::gallery::Gallery;
@@ -152,6 +153,7 @@ impl Workbench {
             Finding::Reference(Err(why)) => self.messages.error(why),
             Finding::Image(path, Ok(image)) => self.gallery.put_file(&path, image),
             Finding::Image(_, Err(why)) => self.messages.error(why),
+            Finding::Areas(areas) => self.desk.areas = areas,
             Finding::Errors(generation, errors) => {
                 if self.render.job().is_some_and(|j| j.generation == generation) {
                     for (estimator, point) in errors {
@@ -214,6 +216,9 @@ impl Workbench {
             if (exposure - self.desk.auto_exposure).abs() > 0.1 {
                 self.desk.auto_exposure = exposure;
             }
+        }
+        if let Some(pass) = self.render.pass.clone() {
+            self.analysis.ask(Kind::Areas, move || Finding::Areas(Areas::of(&pass)));
         }
         let (Some(reference), Some(progress), Some(job)) =
             (self.desk.reference.clone(), &self.render.progress, self.render.job())

@@ -34,10 +34,8 @@ pub fn top(ui: &mut Ui, document: &Document, render: &Render, desk: &mut Desk) {
             ui.separator();
             scene_box(ui, document, desk);
             let paused = render.is_paused();
-            let glyph = if paused { "▶" } else { "⏸" };
-            let pause = ui.button(glyph).on_hover_text("pause or go on (Space)");
-            name(&pause, if paused { "Go on" } else { "Pause" });
-            if pause.clicked() {
+            let pause = ui.button(if paused { "go on" } else { "pause" });
+            if pause.on_hover_text("pause or go on (Space)").clicked() {
                 desk.ask(Action::Pause);
             }
             if ui.button("tile").on_hover_text("render one tile, then pause (.)").clicked() {

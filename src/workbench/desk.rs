@@ -1,6 +1,7 @@
 //! What the window knows beyond the session: the pointer, open dialogs, findings of the analysis thread.
 
 use super::actions::Action;
+use super::areas::Areas;
 use super::dialogs::Dialogs;
 use crate::measure::{ErrorMetrics, Reference};
 use std::collections::BTreeMap;
@@ -17,6 +18,8 @@ pub enum Kind {
     Image(String),
     /// Errors of all panels.
     Errors,
+    /// Histogram of footprint areas.
+    Areas,
 }
 
 /// What the analysis thread has found.
@@ -29,6 +32,8 @@ pub enum Finding {
     Image(String, Result<crate::render::film::Image, String>),
     /// Errors by estimator, of a generation.
     Errors(u64, Vec<(String, ErrorPoint)>),
+    /// Histogram of footprint areas.
+    Areas(Areas),
 }
 
 /// How a scene that was opened comes into the history.
@@ -83,6 +88,8 @@ pub struct Desk {
     pub reference: Option<Arc<Reference>>,
     /// Error curves by estimator.
     pub errors: BTreeMap<String, Vec<ErrorPoint>>,
+    /// Footprint areas of the last pass.
+    pub areas: Areas,
     /// What the user asked for in this frame.
     pub actions: Vec<Action>,
     /// Whether what the panes show needs more frames to be brought up to date.

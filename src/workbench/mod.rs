@@ -8,6 +8,7 @@
 pub mod actions;
 pub mod analysis;
 pub mod app;
+pub mod areas;
 pub mod bars;
 pub mod desk;
 pub mod dialogs;

@@ -1,7 +1,7 @@
 //! Widgets with a label, a unit and the equation that they stand for.
 
 use crate::workbench::theme::mono;
-use egui::{DragValue, Response, Ui};
+use egui::{DragValue, Response, SliderClamping, Ui};
 use std::ops::RangeInclusive;
 
 /// A row of a settings grid: the label left, the widget right, both with the tooltip. The widget is named by the label.
@@ -25,13 +25,17 @@ pub fn rows(ui: &mut Ui, id: &str, add: impl FnOnce(&mut Ui)) {
 /// A slider over a whole number; logarithmic if the range is wide.
 pub fn integer(ui: &mut Ui, label: &str, tip: &str, value: &mut i64, range: RangeInclusive<i64>) -> bool {
     let wide = *range.end() > 1000;
-    row(ui, label, tip, |ui| ui.add(egui::Slider::new(value, range).logarithmic(wide).integer())).changed()
+    row(ui, label, tip, |ui| {
+        ui.add(egui::Slider::new(value, range).logarithmic(wide).integer().clamping(SliderClamping::Edits))
+    })
+    .changed()
 }
 
 /// A slider over a number with a unit.
 pub fn real(ui: &mut Ui, label: &str, tip: &str, value: &mut f64, range: RangeInclusive<f64>, unit: &str) -> bool {
     let wide = *range.start() > 0.0 && range.end() / range.start() > 100.0;
-    let slider = egui::Slider::new(value, range).logarithmic(wide).suffix(unit).max_decimals(3);
+    // Only edits are clamped and rounded: a value that was set elsewhere is shown as it is.
+    let slider = egui::Slider::new(value, range).logarithmic(wide).suffix(unit).clamping(SliderClamping::Edits);
     row(ui, label, tip, |ui| ui.add(slider)).changed()
 }
 
