@@ -60,6 +60,13 @@ fn wrong_calls_are_refused_in_one_line() {
         (vec!["render", "ring", "-o", "a.bmp"], ".exr or .png"),
         (vec!["render", "ring", "-o", "a.exr", "--passes", "0"], "--passes"),
         (vec!["render", "ring", "-o", "a.exr", "--seconds", "-1"], "--seconds"),
+        (vec!["inspect", "ring"], "--pixel"),
+        (vec!["inspect", "ring", "--pixel", "12"], "column,row"),
+        (vec!["inspect", "ring", "--pixel", "-1,5"], "column,row"),
+        (vec!["inspect", "ring", "--pixel", "32,5", "--size", "32x32"], "outside the image of 32x32"),
+        (vec!["inspect", "ring", "--pixel", "1,1", "--pass", "0"], "--pass"),
+        (vec!["inspect", "ring", "--pixel", "1,1", "--estimators", "sharp"], "there are density"),
+        (vec!["inspect", "ring", "--pixel", "1,1", "--estimators", "regular", "--sort", "density"], "not among"),
         (vec!["paint"], "nor a file"),
         (vec!["compare", "ring", "--colour"], "--colour"),
     ] {
@@ -218,6 +225,60 @@ fn render_writes_an_image_and_its_stats() {
     let png = folder.path().join("a.png");
     assert!(cusp(&["render", "plane", "--size", "16x16", "--quiet", "-o", path(&png)]).stdout.is_empty());
     assert_eq!(image::open(&png).expect("a PNG").width(), 16);
+}
+
+/// The inspector's pixel, and the sum of its photons, against the pixel that `render` writes.
+#[test]
+fn inspect_explains_the_pixel_that_render_writes() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let exr = folder.path().join("a.exr");
+    let common = ["--size", "48x40", "--photons", "30000"];
+    for (scene, x, y) in [("ring", 24, 20), ("glass_sphere", 25, 24)] {
+        let at = format!("{x},{y}");
+        let out = cusp(&[&["inspect", scene, "--pixel", &at, "--json"][..], &common].concat());
+        assert!(out.status.success(), "{}", text(&out.stderr));
+        let json: serde_json::Value = serde_json::from_slice(&out.stdout).expect("JSON");
+        for key in ["version", "pixel", "pass", "plan", "hits", "path", "photons", "settings"] {
+            assert!(!json[key].is_null(), "{key}");
+        }
+        let rgb = |v: &serde_json::Value| [0, 1, 2].map(|c| v[c].as_f64().expect("a number") as f32);
+        let list = json["estimators"].as_array().expect("a list");
+        assert_eq!(list.len(), 6);
+        for (e, of) in list.iter().enumerate() {
+            let name = of["name"].as_str().expect("a name");
+            let render = ["render", scene, "--estimator", name, "--quiet", "-o", path(&exr)];
+            assert!(cusp(&[&render[..], &common].concat()).status.success());
+            let image = image::open(&exr).expect("an EXR").to_rgb32f();
+            assert_eq!(rgb(&of["pixel"]), image.get_pixel(x, y).0, "{scene} {name}");
+            let mut sum = rgb(&of["direct_and_emitted"]).map(f64::from);
+            for photon in json["photons"].as_array().expect("a list") {
+                let added = rgb(&photon["contributions"][e]);
+                sum.iter_mut().zip(added).for_each(|(s, a)| *s += f64::from(a));
+            }
+            for (s, value) in sum.into_iter().zip(rgb(&of["pixel"])) {
+                assert!((s - f64::from(value)).abs() <= f64::from(value) * 2f64.powi(-21), "{scene} {name}");
+            }
+        }
+        assert!(json["photons"].as_array().is_some_and(|p| p.len() > 10));
+    }
+}
+
+#[test]
+fn inspect_is_readable_by_people() {
+    let args = ["inspect", "ring", "--size", "64x64", "--photons", "5e4", "--pixel", "32,36"];
+    let shown = |more: &[&str]| {
+        let out = cusp(&[&args[..], more].concat());
+        assert!(out.status.success(), "{}", text(&out.stderr));
+        text(&out.stdout)
+    };
+    let table = |text: &str| text.lines().filter(|l| l.starts_with("  caustic ")).count();
+    let few = shown(&["--estimators", "regular,integrated", "--sort", "integrated", "--rows", "3"]);
+    assert!(few.starts_with("ring: pixel 32,36 of 64x64, pass 1"), "{few}");
+    assert!(few.contains("more are left out") && few.contains("figure 10") && few.contains("\nplan\n"), "{few}");
+    let all = shown(&["--estimators", "regular,integrated", "--rows", "0"]);
+    assert!(!all.contains("left out; --rows") && table(&all) > table(&few), "{all}");
+    assert!(shown(&["--pass", "3"]).contains("pass 3"));
+    assert!(shown(&["--quiet"]).is_empty());
 }
 
 #[test]

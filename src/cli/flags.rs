@@ -163,6 +163,18 @@ fn size(text: &str) -> Result<[u32; 2], String> {
     Ok([side(w)?, side(h)?])
 }
 
+/// `x,y`.
+///
+/// # Errors
+/// A text that is no pair of whole numbers from 0 on.
+pub fn pixel(text: &str) -> Result<[u32; 2], String> {
+    let numbers: Result<Vec<u32>, _> = text.split(',').map(|s| s.trim().parse()).collect();
+    match numbers.as_deref() {
+        Ok(&[x, y]) => Ok([x, y]),
+        _ => Err("write column,row from 0, as in 256,200".into()),
+    }
+}
+
 /// `x,y,w,h`.
 ///
 /// # Errors
@@ -186,6 +198,8 @@ mod tests {
         assert_eq!(count("-3"), Ok(-3));
         assert!(count("nan").is_err() && count("1.5").is_err() && count("").is_err());
         assert_eq!(size("640x480"), Ok([640, 480]));
+        assert_eq!(pixel("3, 4"), Ok([3, 4]));
+        assert!(pixel("3").is_err() && pixel("-1,2").is_err() && pixel("1,2,3").is_err());
         assert!(size("640").is_err() && size("-1x5").is_err());
         assert!(rect("1,2,3,4").is_ok() && rect("1,2,0,4").is_err() && rect("1,2,3").is_err());
     }

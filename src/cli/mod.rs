@@ -4,6 +4,9 @@ pub mod compare;
 mod compare_table;
 pub mod failure;
 pub mod flags;
+pub mod inspect;
+mod inspect_report;
+mod inspect_text;
 pub mod lists;
 pub mod progress;
 pub mod render;
@@ -34,6 +37,8 @@ enum Command {
     Compare(compare::CompareArgs),
     /// One estimator, one image
     Render(render::RenderArgs),
+    /// Why a pixel has its value: its view path, its photons, their weights under each estimator, the plan
+    Inspect(inspect::InspectArgs),
     /// The built-in scenes
     Scenes(lists::ListArgs),
     /// The estimators and their settings
@@ -58,6 +63,7 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
     let result = match cli.command {
         Some(Command::Compare(args)) => compare::run(&args),
         Some(Command::Render(args)) => render::run(&args),
+        Some(Command::Inspect(args)) => inspect::run(&args),
         Some(Command::Scenes(args)) => lists::scenes(&args),
         Some(Command::Estimators(args)) => lists::estimators(&args),
         None => window::run(cli.scene.unwrap_or_else(|| "ring".into()), cli.flags),

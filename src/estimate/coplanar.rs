@@ -5,7 +5,7 @@
 //! the same, and the photon's polygon is the same square or regular polygon for all photons. The clipped vertices
 //! carry their parameters in the view footprint along, which maps the centroid back (eq. 66) without an inverse.
 
-use super::{Estimator, Gathered, Lookup, View, weighted_sum};
+use super::{Construction, Estimator, Gathered, Lookup, SamplingPoint, View, weighted_sum};
 use crate::estimate::clip::{self, ClippedPolygon, HalfPlane, MAX_CORNERS, MAX_VERTICES};
 use crate::estimate::kernel::silverman;
 use crate::estimate::polygon::{mean_over_parallelogram, mean_over_part};
@@ -72,12 +72,14 @@ impl Coplanar {
         Ok(Box::new(Self::new(shape, weight)))
     }
 
-    fn over_area(&self, photon: &MapPhoton, view: &View) -> f64 {
+    /// The part of the view footprint that the photon's shape covers along the view ray; None if it is far off.
+    #[inline]
+    fn clipped(&self, photon: &MapPhoton, view: &View) -> Option<ClippedPolygon> {
         let v = view.direction;
         let across = photon.normal.dot(v);
         if across.abs() < 1e-6 {
             // Seen edge-on the photon covers nothing.
-            return 0.0;
+            return None;
         }
         let project = |x: Vec3| {
             let y = x - v * (photon.normal.dot(x) / across);
@@ -88,16 +90,25 @@ impl Coplanar {
         let (pc, pa, pb) = (project(offset), project(a), project(b));
         let reach = pa.abs() + pb.abs();
         if pc.x.abs() - reach.x >= 1.0 || pc.y.abs() - reach.y >= 1.0 {
-            return 0.0;
+            return None;
         }
         let mut polygon = ClippedPolygon::whole(pc, pa, pb);
         for plane in &self.planes {
             polygon.clip(plane);
         }
+        Some(polygon)
+    }
+
+    fn over_area(&self, photon: &MapPhoton, view: &View) -> f64 {
+        let Some(polygon) = self.clipped(photon, view) else {
+            return 0.0;
+        };
         let (coverage, centroid) = polygon.coverage_and_centroid();
         if coverage <= 0.0 {
             return 0.0;
         }
+        let offset = view.query.center - photon.position;
+        let [a, b] = view.query.axes;
         let filtered = match self.weight {
             Weight::Centroid => {
                 let x = offset + a * centroid.x as f32 + b * centroid.y as f32;
@@ -151,5 +162,25 @@ impl Estimator for Coplanar {
 
     fn irradiance(&self, gathered: &Gathered, view: &View) -> Rgb {
         weighted_sum(gathered, |p| self.over_area(p, view))
+    }
+
+    /// The covered part, and as its only point the centroid at which `weight=centroid` evaluates the kernel.
+    fn construction(&self, photon: &MapPhoton, view: &View) -> Construction {
+        let Some(polygon) = self.clipped(photon, view) else {
+            return Construction::default();
+        };
+        let (coverage, centroid) = polygon.coverage_and_centroid();
+        let [a, b] = view.query.axes;
+        let at = |p: DVec2| view.query.center + a * p.x as f32 + b * p.y as f32;
+        if coverage <= 0.0 {
+            return Construction::default();
+        }
+        let position = at(centroid);
+        let inside = photon.to_filter(position - photon.position).length_squared() < 1.0;
+        let points = match self.weight {
+            Weight::Centroid => vec![SamplingPoint { position, inside }],
+            Weight::Mean => Vec::new(),
+        };
+        Construction { points, covered: polygon.vertices().iter().map(|v| at(v.parameter)).collect(), coverage }
     }
 }

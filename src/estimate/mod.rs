@@ -1,6 +1,7 @@
 //! Radiance estimators: one file each, one trait, one registry.
 
 pub mod clip;
+pub mod construction;
 pub mod coplanar;
 pub mod density;
 pub mod integrated;
@@ -13,6 +14,8 @@ pub mod settings;
 
 #[cfg(test)]
 mod energy_tests;
+
+pub use construction::{Construction, SamplingPoint};
 
 use crate::math::rgb::Rgb;
 use crate::photons::MapPhoton;
@@ -74,6 +77,11 @@ pub trait Estimator: Send + Sync {
 
     /// Irradiance, W/m²: the sum of powers times weights.
     fn irradiance(&self, gathered: &Gathered, view: &View) -> Rgb;
+
+    /// What it does with one photon, as plain geometry; nothing by default.
+    fn construction(&self, _photon: &MapPhoton, _view: &View) -> Construction {
+        Construction::default()
+    }
 
     /// Id and settings, as the command line takes them.
     fn name(&self) -> String {

@@ -1,6 +1,6 @@
 //! `multi_sampled`: the kernel averaged over points of the view footprint (Pedersen 2011, eq. 68 to 71).
 
-use super::{Estimator, Gathered, Lookup, View, weighted_sum};
+use super::{Construction, Estimator, Gathered, Lookup, SamplingPoint, View, weighted_sum};
 use crate::estimate::settings::{Spec, SpecError};
 use crate::math::rgb::Rgb;
 use crate::photons::MapPhoton;
@@ -121,6 +121,18 @@ impl Estimator for MultiSampled {
 
     fn irradiance(&self, gathered: &Gathered, view: &View) -> Rgb {
         weighted_sum(gathered, |p| self.over_area(p, view))
+    }
+
+    fn construction(&self, photon: &MapPhoton, view: &View) -> Construction {
+        let [a, b] = view.query.axes;
+        let c = photon.to_filter(view.query.center - photon.position);
+        let (fa, fb) = (photon.to_filter(a), photon.to_filter(b));
+        let point = |s: f32, t: f32| SamplingPoint {
+            position: view.query.center + a * s + b * t,
+            inside: (c + fb * t + fa * s).length_squared() < 1.0,
+        };
+        let points = self.offsets.iter().flat_map(|&t| self.offsets.iter().map(move |&s| point(s, t))).collect();
+        Construction { points, ..Default::default() }
     }
 }
 

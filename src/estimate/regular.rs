@@ -1,6 +1,6 @@
 //! `regular`: photon differentials at the hit point (Schjøth 2007; Pedersen 2011, eq. 46), with one or n×n view rays.
 
-use super::{Estimator, Gathered, Lookup, View, weighted_sum};
+use super::{Construction, Estimator, Gathered, Lookup, SamplingPoint, View, weighted_sum};
 use crate::estimate::kernel::silverman;
 use crate::estimate::settings::{Spec, SpecError};
 use crate::math::rgb::Rgb;
@@ -85,5 +85,11 @@ impl Estimator for Regular {
 
     fn irradiance(&self, gathered: &Gathered, view: &View) -> Rgb {
         weighted_sum(gathered, |p| kernel_over_area(p, view))
+    }
+
+    fn construction(&self, photon: &MapPhoton, view: &View) -> Construction {
+        let position = view.query.center;
+        let inside = photon.to_filter(position - photon.position).length_squared() < 1.0;
+        Construction { points: vec![SamplingPoint { position, inside }], ..Default::default() }
     }
 }

@@ -39,6 +39,28 @@ impl MapPhoton {
         Vec3::new(self.rows[0].dot(v), self.rows[1].dot(v), self.rows[2].dot(v))
     }
 
+    /// Half-axes `(dα, dβ)` of its footprint in its tangent plane, metres: scaled, and after floor and ceiling.
+    ///
+    /// From the rows of the filter transform and the area, without an inverse, so that a thin ellipse keeps its digits.
+    pub fn axes(&self) -> [Vec3; 2] {
+        let n = self.normal.as_dvec3();
+        let [r0, r1, _] = self.rows.map(|r| r.as_dvec3());
+        let product = 1.0 / (std::f64::consts::PI * f64::from(self.inverse_area));
+        let signed = product.copysign(r0.cross(r1).dot(n));
+        [r1.cross(n) * signed, n.cross(r0) * signed].map(|c| c.as_vec3())
+    }
+
+    /// Area of its ellipse, `π ‖dα × dβ‖`, m².
+    pub fn area(&self) -> f32 {
+        (1.0 / f64::from(self.inverse_area)) as f32
+    }
+
+    /// Longest over shortest semi-axis of its ellipse, at least 1: the condition of its filter transform in the plane.
+    pub fn condition(&self) -> f64 {
+        let long = f64::from(self.reach);
+        (std::f64::consts::PI * f64::from(self.inverse_area) * long * long).max(1.0)
+    }
+
     /// Whether it lights the side of a surface that has this unit normal.
     #[inline]
     pub fn lights(&self, normal: Vec3) -> bool {
@@ -125,6 +147,14 @@ impl PhotonMap {
         &self.photons
     }
 
+    /// Index among the photons that the map was made of, of the photon at `index` of [`PhotonMap::photons`].
+    pub fn stored_index(&self, index: u32) -> Option<u32> {
+        match &self.overlap {
+            Some(tree) => tree.order().get(index as usize).copied(),
+            None => ((index as usize) < self.photons.len()).then_some(index),
+        }
+    }
+
     /// Footprints raised to the floor and lowered to the ceiling.
     pub fn limited(&self) -> (u64, u64) {
         (self.floored, self.capped)
@@ -187,7 +217,7 @@ impl PhotonMap {
 }
 
 /// Whether the query's parallelogram comes nearer than 1 to the photon in filter space.
-fn meets_unit_ball(p: &MapPhoton, query: &Query) -> bool {
+pub fn meets_unit_ball(p: &MapPhoton, query: &Query) -> bool {
     let c = p.to_filter(query.center - p.position);
     let cc = c.length_squared();
     if cc < 1.0 {
@@ -338,6 +368,30 @@ mod tests {
             for i in by_overlap {
                 assert!(by_k.binary_search(&i).is_ok());
             }
+        }
+    }
+
+    /// A map's photons give back the footprints that they were made of, also when they are skew.
+    #[test]
+    fn axes_and_order_come_back() {
+        let photons = random_photons(300);
+        for overlap in [false, true] {
+            let map = PhotonMap::new(&photons, LIMITS, MapParts { kd_tree: true, overlap });
+            for (i, p) in map.photons().iter().enumerate() {
+                let stored = &photons[map.stored_index(i as u32).expect("an index") as usize];
+                assert_eq!(p.position, stored.position);
+                let t = FilterTransform::new(stored.footprint, stored.normal, 1.0, LIMITS.floor, LIMITS.ceiling);
+                if !t.floored {
+                    let given = stored.footprint.map(|c| c - stored.normal * stored.normal.dot(c));
+                    for (axis, given) in p.axes().into_iter().zip(given) {
+                        assert!((axis - given).length() < 2e-6 * p.reach, "{axis} {given}");
+                    }
+                }
+                let [a, b] = p.axes();
+                let area = std::f32::consts::PI * a.cross(b).length();
+                assert!((area / p.area() - 1.0).abs() < 1e-5 * p.condition() as f32);
+            }
+            assert_eq!(map.stored_index(300), None);
         }
     }
 

@@ -33,6 +33,11 @@ impl OverlapTree {
         (Self { bvh }, order)
     }
 
+    /// For each entry the box that it is, as [`OverlapTree::new`] returned it.
+    pub fn order(&self) -> &[u32] {
+        &self.bvh.primitive_indices
+    }
+
     /// Calls `visit` with ranges of entries whose node's box holds the point.
     #[inline]
     pub fn at_point(&self, point: Vec3, mut visit: impl FnMut(std::ops::Range<u32>)) {

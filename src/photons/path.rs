@@ -68,6 +68,33 @@ pub struct Flight<'a> {
     pub sequence: Sequence,
 }
 
+/// A surface that a photon meets.
+pub struct PhotonMeeting<'a> {
+    /// The surface.
+    pub surface: &'a Surface,
+    /// Unit direction in which it arrives.
+    pub direction: Vec3,
+    /// Way from the last surface, or from the light, metres.
+    pub distance: f32,
+    /// Footprint `(dα, dβ)` at scale 1 in the surface's plane, metres; zero if photons carry none.
+    pub footprint: [Vec3; 2],
+    /// Power on arrival, W.
+    pub power: Rgb,
+    /// The kind as which it was stored here.
+    pub stored: Option<PhotonKind>,
+}
+
+/// Hears what a photon meets.
+pub trait PhotonRecorder {
+    /// It meets a surface.
+    fn meets(&mut self, _meeting: &PhotonMeeting) {}
+}
+
+/// Records nothing, at no cost.
+pub struct Unrecorded;
+
+impl PhotonRecorder for Unrecorded {}
+
 /// A sphere around all specular surfaces.
 #[derive(Clone, Copy, Debug)]
 pub struct SpecularBounds {
@@ -103,7 +130,8 @@ impl Flight<'_> {
     /// Follows one photon of `count` from its `emission` and appends what is stored to `out`.
     ///
     /// Russian roulette keeps the mean power over channels (Pedersen 2011, section 2.1.2); colours shift it between
-    /// channels. `index` names the photon in the sequence.
+    /// channels. `index` names the photon in the sequence; `recorder` hears of every surface.
+    #[expect(clippy::too_many_arguments, reason = "outputs that the caller keeps between photons")]
     pub fn trace(
         &self,
         index: u64,
@@ -112,6 +140,7 @@ impl Flight<'_> {
         count: u64,
         out: &mut StoredPhotons,
         counts: &mut PathCounts,
+        recorder: &mut impl PhotonRecorder,
     ) {
         let scene = self.scene;
         let mut ray = Ray { origin: emission.origin, direction: emission.direction };
@@ -139,6 +168,14 @@ impl Flight<'_> {
                 }
             }
             let material = &scene.materials[surface.material as usize];
+            recorder.meets(&PhotonMeeting {
+                surface: &surface,
+                direction: v,
+                distance: hit.t,
+                footprint: d.dp,
+                power,
+                stored: (material.is_diffuse() && self.keeps(kind)).then_some(kind),
+            });
             match material {
                 Material::Emitter { .. } => return,
                 Material::Diffuse { .. } => {

@@ -2,9 +2,11 @@
 
 use crate::math::rgb::Rgb;
 use glam::Vec3;
+use serde::Serialize;
 
 /// What a photon has been through before it was stored.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "snake_case")]
 pub enum PhotonKind {
     /// Straight from the light (LD).
     Direct,
@@ -12,6 +14,20 @@ pub enum PhotonKind {
     Caustic,
     /// Anything else.
     Global,
+}
+
+impl PhotonKind {
+    /// All kinds, in the order in which maps are gathered from.
+    pub const ALL: [Self; 3] = [Self::Direct, Self::Caustic, Self::Global];
+
+    /// `direct`, `caustic` or `global`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Direct => "direct",
+            Self::Caustic => "caustic",
+            Self::Global => "global",
+        }
+    }
 }
 
 /// A photon differential on a diffuse surface, its footprint at scale 1.
@@ -42,6 +58,15 @@ pub struct StoredPhotons {
 
 impl StoredPhotons {
     /// The list of that kind.
+    pub fn of(&self, kind: PhotonKind) -> &[Photon] {
+        match kind {
+            PhotonKind::Direct => &self.direct,
+            PhotonKind::Caustic => &self.caustic,
+            PhotonKind::Global => &self.global,
+        }
+    }
+
+    /// The list of that kind, to be added to.
     pub fn of_mut(&mut self, kind: PhotonKind) -> &mut Vec<Photon> {
         match kind {
             PhotonKind::Direct => &mut self.direct,

@@ -3,6 +3,8 @@
 pub mod change;
 pub mod direct;
 pub mod film;
+pub mod heatmap;
+pub mod inspect;
 pub mod pass;
 pub mod photon_pass;
 pub mod plan;

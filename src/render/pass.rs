@@ -1,7 +1,9 @@
 //! One pass as a value: the photons, their maps, and everything needed to look at it again.
 
-use crate::render::photon_pass::{PhotonMaps, PhotonPass};
-use crate::render::plan::Plan;
+use crate::estimate::Estimator;
+use crate::render::photon_pass::{Emitter, PhotonMaps, PhotonPass};
+use crate::render::plan::{Pilot, Plan};
+use crate::render::renderer::{area_factor, slots};
 use crate::render::settings::RenderSettings;
 use crate::render::view::ViewTracer;
 use crate::render::view_pass::ViewPass;
@@ -33,6 +35,42 @@ pub struct Pass {
 }
 
 impl Pass {
+    /// Makes pass `number` (from 0) alone, as a render by these estimators makes it; None if cancelled.
+    pub fn alone(
+        scene: Arc<Scene>,
+        settings: RenderSettings,
+        estimators: &[Box<dyn Estimator>],
+        number: u32,
+        cancelled: &(dyn Fn() -> bool + Sync),
+    ) -> Option<Self> {
+        let intersector = Arc::new(Intersector::new(&scene.geometry, scene.radius));
+        let pilot = Pilot::needed(&scene, &settings).then(|| Pilot::send(&scene, &intersector, &settings));
+        let plan = Plan::new(&scene, &settings, &slots(estimators, settings.gather), pilot.as_ref());
+        let area_factor = area_factor(number);
+        let (photons, maps) = (Arc::default(), PhotonMaps::default());
+        let mut pass = Self { scene, intersector, settings, plan, photons, maps, number, area_factor };
+        if pass.plan.needs_photons() {
+            pass.photons = Arc::new(pass.emitter().run(u64::from(number), cancelled));
+        }
+        if cancelled() {
+            return None;
+        }
+        pass.maps = PhotonMaps::new(&pass.scene, &pass.plan, &pass.photons.stored, pass.scale());
+        Some(pass)
+    }
+
+    /// What traced its photons.
+    pub fn emitter(&self) -> Emitter<'_> {
+        Emitter {
+            scene: &self.scene,
+            intersector: &self.intersector,
+            path: self.plan.path_settings(&self.settings),
+            sampling: self.settings.sampling,
+            photons: self.settings.photons,
+            seed: self.settings.seed,
+        }
+    }
+
     /// What renders views of this pass.
     pub fn view(&self) -> ViewPass<'_> {
         ViewPass {

@@ -1,15 +1,17 @@
 //! The photon pass: all photons of one pass, and the maps made of them.
 
 use crate::math::hash::mix;
+use crate::math::rgb::Rgb;
 use crate::math::sequence::{Sampling, Sequence};
-use crate::photons::emission::{emit, share_photons};
+use crate::photons::emission::{Emission, LightShare, emit, share_photons};
 use crate::photons::map::{FootprintLimits, MapParts};
-use crate::photons::path::{Flight, PathCounts, PathSettings, SpecularBounds};
-use crate::photons::{Photon, PhotonMap, StoredPhotons};
+use crate::photons::path::{Flight, PathCounts, PathSettings, PhotonRecorder, SpecularBounds, Unrecorded};
+use crate::photons::{Photon, PhotonKind, PhotonMap, StoredPhotons};
 use crate::render::plan::Plan;
 use crate::scene::Scene;
 use crate::trace::Intersector;
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// Number of the plan's pilot pass, whose photons are not those of any other.
 pub const PILOT_PASS: u64 = u64::MAX;
@@ -41,41 +43,23 @@ pub struct PhotonPass {
     pub emitted: u64,
     /// What was bounded.
     pub counts: PathCounts,
+    /// Photons of each kind that each chunk of emission stored, in the order of [`PhotonKind::ALL`].
+    pub chunks: Vec<[u32; 3]>,
 }
 
 impl Emitter<'_> {
     /// Traces pass number `pass`. The result does not depend on the number of threads; a cancelled pass is short.
     pub fn run(&self, pass: u64, cancelled: &(dyn Fn() -> bool + Sync)) -> PhotonPass {
-        let seed = mix(mix(self.seed, 0x70_686f_746f_6e73), pass);
-        let shares = share_photons(self.scene, self.photons, &Sequence::new(Sampling::Random, seed));
-        let chunks: Vec<(usize, u64)> = shares
-            .iter()
-            .enumerate()
-            .flat_map(|(s, share)| (0..share.count).step_by(CHUNK as usize).map(move |first| (s, first)))
-            .collect();
-        // Where nothing but caustic photons is kept, those that cannot meet a specular surface need not be followed.
-        let only_caustic = self.path.caustic && !self.path.direct && !self.path.global;
-        let aim = if only_caustic { SpecularBounds::of(self.scene) } else { None };
-        let parts: Vec<PhotonPass> = chunks
+        let departures = Departures::new(self, pass);
+        let parts: Vec<PhotonPass> = departures
+            .chunks
             .par_iter()
-            .map(|&(s, first)| {
+            .map(|&chunk| {
                 let mut part = PhotonPass::default();
-                if cancelled() {
-                    return part;
-                }
-                let share = &shares[s];
-                let light = &self.scene.lights[share.light];
-                let flight = Flight {
-                    scene: self.scene,
-                    intersector: self.intersector,
-                    settings: self.path,
-                    sequence: Sequence::new(self.sampling, mix(seed, share.light as u64)),
-                };
-                for i in first..(first + CHUNK).min(share.count) {
-                    let emission = emit(self.scene, light, share.count, flight.sequence.four(i, 0));
-                    part.emitted += 1;
-                    if aim.is_none_or(|a| a.may_meet(emission.origin, emission.direction)) {
-                        flight.trace(i, &emission, share.power, share.count, &mut part.stored, &mut part.counts);
+                if !cancelled() {
+                    let flight = departures.flight(chunk);
+                    for number in departures.numbers(chunk) {
+                        departures.send(&flight, chunk, number, &mut part, &mut Unrecorded);
                     }
                 }
                 part
@@ -83,11 +67,129 @@ impl Emitter<'_> {
             .collect();
         let mut whole = PhotonPass::default();
         for mut part in parts {
+            whole.chunks.push(PhotonKind::ALL.map(|kind| part.stored.of(kind).len() as u32));
             whole.stored.append(&mut part.stored);
             whole.emitted += part.emitted;
             whole.counts += part.counts;
         }
         whole
+    }
+
+    /// Traces one photon of `photons`, which this emitter made as pass `pass`, once more: the one whose path stored
+    /// number `index` of that kind. `recorder` hears of its whole path.
+    ///
+    /// It follows again the chunk of emission that the photon came in, which is a few thousand at most. None if there
+    /// is no such photon, or if this emitter did not make it.
+    pub fn retrace(
+        &self,
+        pass: u64,
+        photons: &PhotonPass,
+        kind: PhotonKind,
+        index: usize,
+        recorder: &mut impl PhotonRecorder,
+    ) -> Option<Departure> {
+        let stored = photons.stored.of(kind).get(index)?;
+        let mut before = 0;
+        let at = photons.chunks.iter().position(|counts| {
+            let own = counts[kind as usize] as usize;
+            let found = index < before + own;
+            before += if found { 0 } else { own };
+            found
+        })?;
+        let departures = Departures::new(self, pass);
+        let chunk = *departures.chunks.get(at)?;
+        let flight = departures.flight(chunk);
+        for number in departures.numbers(chunk) {
+            let mut part = PhotonPass::default();
+            departures.send(&flight, chunk, number, &mut part, &mut Unrecorded);
+            let own = part.stored.of(kind);
+            if let Some(again) = own.get(index - before) {
+                let same = again.position == stored.position && again.power == stored.power;
+                return same.then(|| departures.send(&flight, chunk, number, &mut part, recorder)).map(|emission| {
+                    let share = &departures.shares[chunk.share];
+                    Departure { light: share.light, number, power: share.power, emission, nth: index - before }
+                });
+            }
+            before += own.len();
+        }
+        None
+    }
+}
+
+/// How a photon left its light.
+#[derive(Clone, Copy, Debug)]
+pub struct Departure {
+    /// Index of the light.
+    pub light: usize,
+    /// Number of the photon among those of the light.
+    pub number: u64,
+    /// Power, W.
+    pub power: Rgb,
+    /// Start, direction and differential.
+    pub emission: Emission,
+    /// How many photons of the same kind the path stored before the one that was asked for.
+    pub nth: usize,
+}
+
+/// Photons of one light that one thread follows.
+#[derive(Clone, Copy)]
+struct Chunk {
+    share: usize,
+    first: u64,
+}
+
+/// The photons of a pass before they fly.
+struct Departures<'a> {
+    emitter: &'a Emitter<'a>,
+    seed: u64,
+    shares: Vec<LightShare>,
+    chunks: Vec<Chunk>,
+    aim: Option<SpecularBounds>,
+}
+
+impl<'a> Departures<'a> {
+    fn new(emitter: &'a Emitter<'a>, pass: u64) -> Self {
+        let seed = mix(mix(emitter.seed, 0x70_686f_746f_6e73), pass);
+        let shares = share_photons(emitter.scene, emitter.photons, &Sequence::new(Sampling::Random, seed));
+        let of = |(share, s): (usize, &LightShare)| {
+            (0..s.count).step_by(CHUNK as usize).map(move |first| Chunk { share, first })
+        };
+        let chunks = shares.iter().enumerate().flat_map(of).collect();
+        // Where nothing but caustic photons is kept, those that cannot meet a specular surface need not be followed.
+        let path = &emitter.path;
+        let only_caustic = path.caustic && !path.direct && !path.global;
+        let aim = if only_caustic { SpecularBounds::of(emitter.scene) } else { None };
+        Self { emitter, seed, shares, chunks, aim }
+    }
+
+    fn flight(&self, chunk: Chunk) -> Flight<'a> {
+        let Emitter { scene, intersector, path, sampling, .. } = *self.emitter;
+        let light = self.shares[chunk.share].light as u64;
+        Flight { scene, intersector, settings: path, sequence: Sequence::new(sampling, mix(self.seed, light)) }
+    }
+
+    fn numbers(&self, chunk: Chunk) -> Range<u64> {
+        chunk.first..(chunk.first + CHUNK).min(self.shares[chunk.share].count)
+    }
+
+    /// Sends one photon off and follows it.
+    fn send(
+        &self,
+        flight: &Flight,
+        chunk: Chunk,
+        number: u64,
+        part: &mut PhotonPass,
+        recorder: &mut impl PhotonRecorder,
+    ) -> Emission {
+        let share = &self.shares[chunk.share];
+        let scene = self.emitter.scene;
+        let emission = emit(scene, &scene.lights[share.light], share.count, flight.sequence.four(number, 0));
+        part.emitted += 1;
+        if self.aim.is_none_or(|a| a.may_meet(emission.origin, emission.direction)) {
+            let (out, counts) = (&mut part.stored, &mut part.counts);
+            flight.trace(number, &emission, share.power, share.count, out, counts, recorder);
+        }
+        emission
     }
 }
 
@@ -121,7 +223,21 @@ impl PhotonMaps {
 
     /// Those that are there.
     pub fn all(&self) -> impl Iterator<Item = &PhotonMap> {
-        [&self.direct, &self.caustic, &self.global].into_iter().flatten()
+        self.by_kind().map(|(_, map)| map)
+    }
+
+    /// Those that are there, with the kind of their photons.
+    pub fn by_kind(&self) -> impl Iterator<Item = (PhotonKind, &PhotonMap)> {
+        PhotonKind::ALL.into_iter().filter_map(|kind| Some((kind, self.of(kind)?)))
+    }
+
+    /// The map of that kind, if it is there.
+    pub fn of(&self, kind: PhotonKind) -> Option<&PhotonMap> {
+        match kind {
+            PhotonKind::Direct => self.direct.as_ref(),
+            PhotonKind::Caustic => self.caustic.as_ref(),
+            PhotonKind::Global => self.global.as_ref(),
+        }
     }
 
     /// Footprints raised to the floor and lowered to the ceiling in all maps.

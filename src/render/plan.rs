@@ -58,6 +58,13 @@ pub struct Slot<'a> {
     pub gather: Gather,
 }
 
+impl<'a> Slot<'a> {
+    /// An estimator in a render that looks photons up by `gather`.
+    pub fn new(estimator: &'a dyn Estimator, gather: Gather) -> Self {
+        Self { estimator, gather: if estimator.lookup() == Lookup::Disc { Gather::Knn } else { gather } }
+    }
+}
+
 impl Plan {
     /// Plans for a scene and estimators, on the evidence of a pilot where [`Pilot::needed`] says so.
     pub fn new(scene: &Scene, settings: &RenderSettings, slots: &[Slot], pilot: Option<&Pilot>) -> Self {
@@ -201,6 +208,19 @@ impl Plan {
     /// Whether photons are needed at all.
     pub fn needs_photons(&self) -> bool {
         self.direct_map || self.caustic_map || self.global_map
+    }
+
+    /// The first part that a slot needs and a pass of this plan does not have.
+    pub fn lacks(&self, slot: &Slot) -> Option<&'static str> {
+        let by_k = slot.gather == Gather::Knn || slot.estimator.lookup() == Lookup::Disc;
+        let needs = [
+            (needs_photon_footprint(slot.estimator), self.photon_differentials, "photon differentials"),
+            (needs_view_footprint(slot.estimator), self.view_differentials, "view differentials"),
+            (by_k, self.kd_tree, "kd-tree"),
+            (!by_k, self.overlap, "footprint hierarchy"),
+        ];
+        let missing = needs.into_iter().find(|(needed, there, _)| *needed && !*there);
+        missing.filter(|_| self.needs_photons()).map(|(.., part)| part)
     }
 
     /// How photon paths are followed under this plan.

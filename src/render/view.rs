@@ -47,6 +47,40 @@ pub struct ViewTracer<'a> {
     pub plan: &'a Plan,
 }
 
+/// A surface that a view path meets.
+pub struct ViewMeeting<'a> {
+    /// The surface.
+    pub surface: &'a Surface,
+    /// Unit direction of the ray.
+    pub direction: Vec3,
+    /// Length of the ray, metres.
+    pub distance: f32,
+    /// Footprint `(dα, dβ)` of the view differential in the surface's plane, metres; zero if the plan carries none.
+    pub footprint: [Vec3; 2],
+    /// What a radiance of 1 that leaves here towards the ray adds at the camera.
+    pub throughput: Rgb,
+    /// Surfaces that the path met before.
+    pub depth: u32,
+    /// Radiance at the camera of what light needs no photons here, W/(m² sr).
+    pub light: Rgb,
+    /// Index of the view hit that was made here.
+    pub hit: Option<usize>,
+}
+
+/// Hears what view paths meet. A path's two branches come one after the other: first a surface, then all behind it.
+pub trait ViewRecorder {
+    /// The ray of a cell of a pixel sets out. Cells are counted row by row.
+    fn ray(&mut self, _cell: u32) {}
+
+    /// It meets a surface.
+    fn meets(&mut self, _meeting: &ViewMeeting) {}
+}
+
+/// Records nothing, at no cost.
+pub struct Unrecorded;
+
+impl ViewRecorder for Unrecorded {}
+
 /// A path that is still to be followed.
 #[derive(Clone, Copy)]
 pub struct Branch {
@@ -63,6 +97,7 @@ impl ViewTracer<'_> {
     /// Follows one camera ray. Diffuse hits go to `hits`; what light needs no photons is returned, W/(m² sr).
     ///
     /// `sequence` and `index` give the path's numbers: set `1 + depth` decides branches. `stack` is scratch.
+    /// `recorder` hears of every surface.
     #[expect(clippy::too_many_arguments, reason = "outputs and scratch that the caller keeps between rays")]
     pub fn trace(
         &self,
@@ -74,6 +109,7 @@ impl ViewTracer<'_> {
         hits: &mut Vec<ViewHit>,
         stack: &mut Vec<Branch>,
         counts: &mut ViewCounts,
+        recorder: &mut impl ViewRecorder,
     ) -> Rgb {
         let mut radiance = Rgb::ZERO;
         stack.clear();
@@ -94,17 +130,19 @@ impl ViewTracer<'_> {
                 branch.throughput *= inside;
             }
             let material = &self.scene.materials[surface.material as usize];
+            let (throughput, depth, footprint) = (branch.throughput, branch.depth, branch.differential.dp);
+            let (mut light, hits_before) = (Rgb::ZERO, hits.len());
             match material {
                 Material::Emitter { radiance: emitted } => {
                     if surface.front && self.plan.emission {
-                        radiance += branch.throughput * *emitted;
+                        light = throughput * *emitted;
                     }
                 }
                 Material::Diffuse { .. } => {
-                    let weight = branch.throughput * material.diffuse_reflectance(surface.uv) * FRAC_1_PI;
+                    let weight = throughput * material.diffuse_reflectance(surface.uv) * FRAC_1_PI;
                     if self.plan.shadow_rays {
                         let receiver = Receiver { position: surface.position, normal: surface.normal };
-                        radiance += weight
+                        light = weight
                             * direct::irradiance(
                                 self.scene,
                                 self.intersector,
@@ -117,11 +155,7 @@ impl ViewTracer<'_> {
                     if self.plan.needs_photons() && weight != Rgb::ZERO {
                         hits.push(ViewHit {
                             view: View {
-                                query: Query {
-                                    center: surface.position,
-                                    normal: surface.normal,
-                                    axes: branch.differential.dp,
-                                },
+                                query: Query { center: surface.position, normal: surface.normal, axes: footprint },
                                 direction: v,
                             },
                             weight,
@@ -136,6 +170,17 @@ impl ViewTracer<'_> {
                     self.scatter(material, &surface, branch, sequence, index, stack, counts);
                 }
             }
+            radiance += light;
+            recorder.meets(&ViewMeeting {
+                surface: &surface,
+                direction: v,
+                distance: hit.t,
+                footprint,
+                throughput,
+                depth,
+                light,
+                hit: (hits.len() > hits_before).then_some(hits_before),
+            });
         }
         radiance
     }

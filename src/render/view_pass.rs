@@ -4,14 +4,16 @@ use crate::estimate::{Gathered, Lookup};
 use crate::math::hash::mix;
 use crate::math::rgb::Rgb;
 use crate::math::sequence::{Sampling, Sequence};
-use crate::photons::PhotonMap;
 use crate::photons::kd_tree::Nearest;
+use crate::photons::{PhotonKind, PhotonMap};
 use crate::render::film::Rect;
 use crate::render::photon_pass::PhotonMaps;
 use crate::render::plan::Slot;
 use crate::render::settings::Gather;
 use crate::render::tiles::tiles;
-use crate::render::view::{Branch, ViewCounts, ViewHit, ViewTracer, at_point, sample_position};
+use crate::render::view::{
+    Branch, Unrecorded, ViewCounts, ViewHit, ViewRecorder, ViewTracer, at_point, sample_position,
+};
 use crate::trace::Ray;
 use glam::DVec3;
 use rayon::prelude::*;
@@ -112,8 +114,9 @@ const BATCH: usize = 1 << 20;
 
 /// Buffers that a thread keeps from tile to tile.
 #[derive(Default)]
-struct Scratch {
-    hits: Vec<ViewHit>,
+pub(super) struct Scratch {
+    /// Hits of the rays that were traced last.
+    pub hits: Vec<ViewHit>,
     stack: Vec<Branch>,
     indices: Vec<u32>,
     /// For each hit and map: where its indices start and end, and the radius of its disc.
@@ -159,8 +162,8 @@ impl ViewPass<'_> {
         ViewResult { view_trace: view_trace * scale, tiles, seconds, wall, gathered, counts, complete }
     }
 
-    /// One tile; None if cancelled. Slots take turns at being first, so that none always finds the caches cold.
-    fn tile(
+    /// One tile, whose place among the others is `number`; None if cancelled. Slots take turns at being first, so that none always finds the caches cold.
+    pub(super) fn tile(
         &self,
         rect: Rect,
         number: usize,
@@ -176,7 +179,7 @@ impl ViewPass<'_> {
         let mut all_rays = 0.0;
         for n in rays {
             let start = Instant::now();
-            let base = self.trace(rect, n, scratch, &mut counts);
+            let base = self.trace(rect, n, scratch, &mut counts, &mut Unrecorded);
             let view_trace = start.elapsed().as_secs_f64();
             all_rays += view_trace;
             for k in 0..slots.len() {
@@ -201,7 +204,16 @@ impl ViewPass<'_> {
     }
 
     /// Traces `n`×`n` rays for each pixel; hits go to the scratch, the sum of other light to the result.
-    fn trace(&self, rect: Rect, n: u32, scratch: &mut Scratch, counts: &mut ViewCounts) -> Vec<Rgb> {
+    ///
+    /// Everything about a pixel follows from its place in the image, not from `rect`.
+    pub(super) fn trace(
+        &self,
+        rect: Rect,
+        n: u32,
+        scratch: &mut Scratch,
+        counts: &mut ViewCounts,
+        recorder: &mut impl ViewRecorder,
+    ) -> Vec<Rgb> {
         let t = &self.tracer;
         let camera = &t.scene.camera;
         let size = t.settings.size;
@@ -226,6 +238,7 @@ impl ViewPass<'_> {
                 let (px, py) = sample_position([x, y], [cell % n, cell / n], n, jitter);
                 let (direction, differential) = camera.ray(px, py, size, half);
                 let ray = Ray { origin: camera.position, direction };
+                recorder.ray(cell);
                 *sum += t.trace(
                     ray,
                     differential,
@@ -235,6 +248,7 @@ impl ViewPass<'_> {
                     &mut scratch.hits,
                     &mut scratch.stack,
                     counts,
+                    recorder,
                 );
             }
         }
@@ -243,7 +257,7 @@ impl ViewPass<'_> {
 
     /// Gathers and estimates for the scratch's hits in batches, each part of a batch timed as a whole. A tile is one
     /// batch unless photons overlap by the thousand, so that memory stays bounded.
-    fn estimate(&self, base: &[Rgb], n: u32, slot: &Slot, scratch: &mut Scratch) -> TileImage {
+    pub(super) fn estimate(&self, base: &[Rgb], n: u32, slot: &Slot, scratch: &mut Scratch) -> TileImage {
         let mut sums: Vec<DVec3> = base.iter().map(|b| b.as_dvec3()).collect();
         let mut seconds = PartSeconds::default();
         let mut gathered = 0;
@@ -279,6 +293,23 @@ impl ViewPass<'_> {
         let scale = 1.0 / f64::from(n * n);
         let pixels = sums.into_iter().map(|s| finite(s * scale)).collect();
         TileImage { pixels, seconds, gathered }
+    }
+
+    /// Calls `visit` with the photons of each of the scratch's hits (its index) in each map, as `estimate` sees them.
+    pub(super) fn each_gathered(
+        &self,
+        slot: &Slot,
+        scratch: &mut Scratch,
+        mut visit: impl FnMut(usize, &ViewHit, PhotonKind, &Gathered),
+    ) {
+        for hit in 0..scratch.hits.len() {
+            for (kind, map) in self.maps.by_kind() {
+                scratch.indices.clear();
+                let radius = self.gather(map, slot, hit, scratch);
+                let gathered = Gathered { photons: map.photons(), indices: &scratch.indices, radius };
+                visit(hit, &scratch.hits[hit], kind, &gathered);
+            }
+        }
     }
 
     /// Appends the photons of one hit to the scratch's indices; returns the radius of the disc, if it asks for one.

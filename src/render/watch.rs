@@ -30,6 +30,14 @@ pub struct Silent;
 
 impl Watch for Silent {}
 
+impl TileWatch for Silent {
+    fn cancelled(&self) -> bool {
+        false
+    }
+
+    fn tile_done(&self, _tile: &TileResult) {}
+}
+
 /// A finished tile, with the passes before it.
 pub struct TileDone<'a> {
     /// Its images.

@@ -1,0 +1,187 @@
+//! The inspector against the images, and photon paths against the photons.
+
+use super::*;
+use crate::estimate::registry::estimators;
+use crate::render::{RenderSettings, Renderer};
+use crate::scene::open;
+use crate::scene::scene_file::RenderFile;
+use std::sync::Arc;
+
+const ALL: &str = "density,regular,regular_3x3:n=2,coplanar,coplanar:weight=mean,multi_sampled:n=4,integrated";
+const SIZE: [u32; 2] = [40, 36];
+
+fn pass(scene: &str, flags: &RenderFile, names: &str, number: u32) -> Arc<Pass> {
+    let scene = open(scene).expect("built in");
+    let flags = RenderFile { photons: Some(15_000), ..flags.clone() };
+    let settings = RenderSettings::new(&scene, &flags, Some(SIZE), 11).expect("valid");
+    let mut renderer = Renderer::new(scene.into(), settings, estimators(names).expect("registered"));
+    for _ in 0..=number {
+        renderer.step(&Silent);
+    }
+    Arc::clone(renderer.last_pass().expect("a pass"))
+}
+
+fn by(gather: &str) -> RenderFile {
+    RenderFile { gather: Some(gather.into()), ..Default::default() }
+}
+
+/// The image of that pass alone, under each estimator.
+fn images(pass: &Pass, list: &[Box<dyn Estimator>]) -> Vec<Vec<Rgb>> {
+    let result = pass.view().run(Rect::whole(SIZE), &slots(list, pass.settings.gather), &Silent);
+    let mut images = vec![vec![Rgb::ZERO; (SIZE[0] * SIZE[1]) as usize]; list.len()];
+    for tile in &result.tiles {
+        for (image, part) in images.iter_mut().zip(&tile.images) {
+            for (k, p) in part.pixels.iter().enumerate() {
+                let (x, y) = (tile.rect.x + k as u32 % tile.rect.width, tile.rect.y + k as u32 / tile.rect.width);
+                image[(y * SIZE[0] + x) as usize] = *p;
+            }
+        }
+    }
+    images
+}
+
+/// Value: the bits of the image. Base and contributions: the value, to the rounding of a few f32 operations.
+#[test]
+fn contributions_add_up_to_the_pixel_of_the_image() {
+    let list = estimators(ALL).expect("registered");
+    let mut photons = 0;
+    for scene in ["ring", "cornell", "glass_sphere"] {
+        for (gather, number) in [("overlap", 0), ("overlap", 3), ("knn", 0), ("knn", 2)] {
+            let pass = pass(scene, &by(gather), ALL, number);
+            assert_eq!(pass.number, number);
+            let images = images(&pass, &list);
+            for i in (0..SIZE[0] * SIZE[1]).step_by(53) {
+                let pixel = [i % SIZE[0], i / SIZE[0]];
+                let found = inspect(&pass, &list, pixel).expect("inside");
+                photons += found.rows.len();
+                for (e, of) in found.estimators.iter().enumerate() {
+                    assert_eq!(
+                        of.value.to_array().map(f32::to_bits),
+                        images[e][i as usize].to_array().map(f32::to_bits)
+                    );
+                    let error = (found.sum(e) - of.value).abs();
+                    let bound = of.value * 2f32.powi(-21);
+                    assert!(error.cmple(bound).all(), "{scene} {gather} {number} {pixel:?} {}: {error}", of.name);
+                }
+            }
+        }
+    }
+    assert!(photons > 10_000, "{photons}");
+}
+
+#[test]
+fn parts_of_an_inspection_refer_to_each_other() {
+    let list = estimators(ALL).expect("registered");
+    let pass = pass("glass_sphere", &by("overlap"), ALL, 1);
+    let found = inspect(&pass, &list, [20, 18]).expect("inside");
+    assert!(found.path.iter().any(|v| v.surface == SurfaceKind::Dielectric && v.depth > 0));
+    let mut light = [Rgb::ZERO; 3];
+    for (i, v) in found.path.iter().enumerate() {
+        light[v.rays_per_axis as usize] += v.light / (v.rays_per_axis * v.rays_per_axis) as f32;
+        match v.parent {
+            Some(p) => {
+                let from = &found.path[p];
+                assert!(p < i && from.depth + 1 == v.depth && from.cell == v.cell);
+                assert!(from.rays_per_axis == v.rays_per_axis && from.surface != SurfaceKind::Diffuse);
+                let along = v.position - from.position;
+                assert!((along - v.direction * v.distance).length() < 1e-4 * pass.scene.radius);
+            }
+            None => assert_eq!(v.depth, 0),
+        }
+    }
+    for (h, hit) in found.hits.iter().enumerate() {
+        let v = &found.path[hit.vertex];
+        assert_eq!((v.hit, v.position, v.cell), (Some(h), hit.view.query.center, hit.cell));
+        assert_eq!(v.footprint, hit.view.query.axes);
+        assert!(hit.discs.iter().all(|d| d.estimator == 0 && hit.rays_per_axis == 1));
+    }
+    // Rays of the 2×2 grid come after those of the pixel's one ray.
+    let grids: Vec<u32> = found.hits.iter().map(|h| h.rays_per_axis).collect();
+    assert!(grids.is_sorted() && grids.contains(&1) && grids.contains(&2));
+    for e in &found.estimators {
+        assert!((light[e.rays_per_axis as usize] - e.base).abs().max_element() < 1e-5 * e.base.max_element().max(1e-3));
+    }
+    for row in &found.rows {
+        let photon = &pass.maps.of(row.kind).expect("a map").photons()[row.index as usize];
+        assert_eq!((photon.position, photon.power), (row.position, row.power));
+        for (e, of) in found.estimators.iter().enumerate() {
+            assert!(row.weights[e] == 0.0 || of.rays_per_axis == found.hits[row.hit].rays_per_axis);
+        }
+        // Sampling points inside the photon and a weight of the sampled estimators go together.
+        let (regular, sampled, exact) = (1, 5, 6);
+        assert_eq!(row.samples[regular] > 0 && row.distance < 1.0, row.samples[regular] > 0);
+        assert_eq!(row.weights[sampled] > 0.0, row.samples[sampled] > 0);
+        if row.weights[exact] > 0.0 {
+            assert_ne!(row.situation, Situation::Apart);
+        }
+    }
+}
+
+#[test]
+fn odd_requests_are_refused_in_one_line() {
+    let pass = pass("ring", &by("overlap"), "regular", 0);
+    let list = estimators("regular").expect("registered");
+    for pixel in [[40, 0], [0, 36], [u32::MAX, u32::MAX]] {
+        let error = inspect(&pass, &list, pixel).expect_err("outside").to_string();
+        assert!(error.contains("40x36") && error.lines().count() == 1, "{error}");
+    }
+    for (name, part) in [("density", "kd-tree"), ("integrated", "view differentials")] {
+        let other = estimators(name).expect("registered");
+        assert!(inspect(&pass, &other, [1, 1]).expect_err("not planned").to_string().contains(part));
+    }
+    // Nothing asked for: the view path alone.
+    let path = inspect(&pass, &[], [20, 20]).expect("inside");
+    assert!(path.rows.is_empty() && !path.path.is_empty());
+}
+
+/// Every photon of a pass can be followed back to its light, and arrives as it was stored.
+#[test]
+fn photon_paths_end_where_the_photon_was_stored() {
+    let direct = RenderFile { direct: Some("photons".into()), ..by("overlap") };
+    for (scene, flags, names) in [
+        ("ring", by("overlap"), "integrated"),
+        ("ring", by("knn"), "regular"),
+        ("glass_sphere", direct, "integrated"),
+        ("ring_soft", by("overlap"), "integrated"),
+    ] {
+        let pass = pass(scene, &flags, names, 1);
+        let mut followed = 0;
+        for (kind, map) in pass.maps.by_kind() {
+            for index in (0..map.photons().len() as u32).step_by((map.photons().len() / 20).max(1)) {
+                let photon = &map.photons()[index as usize];
+                let path = photon_path(&pass, kind, index).expect("it was stored");
+                let last = path.vertices.last().expect("a surface");
+                assert_eq!(
+                    (last.position, last.direction, last.normal),
+                    (photon.position, photon.direction, photon.normal)
+                );
+                assert_eq!((last.power, last.stored), (photon.power, Some(kind)));
+                let bounces = path.vertices.len() - 1;
+                let specular = |v: &PhotonVertex| v.surface != SurfaceKind::Diffuse;
+                assert!(match kind {
+                    PhotonKind::Direct => bounces == 0,
+                    PhotonKind::Caustic => bounces > 0 && path.vertices[..bounces].iter().all(specular),
+                    PhotonKind::Global => path.vertices[..bounces].iter().any(|v| !specular(v)),
+                });
+                let start = path.origin + path.direction * path.vertices[0].distance;
+                assert!((start - path.vertices[0].position).length() < 1e-4 * pass.scene.radius);
+                followed += 1;
+            }
+            assert!(photon_path(&pass, kind, map.photons().len() as u32).is_none());
+        }
+        assert!(followed >= 20, "{scene} {followed}");
+    }
+}
+
+/// A pass made alone is the pass of a render.
+#[test]
+fn a_pass_alone_is_that_of_a_render() {
+    let list = estimators(ALL).expect("registered");
+    for number in [0, 2] {
+        let rendered = pass("cornell", &by("overlap"), ALL, number);
+        let (scene, settings) = (Arc::clone(&rendered.scene), rendered.settings.clone());
+        let alone = Pass::alone(scene, settings, &list, number, &|| false).expect("not cancelled");
+        assert_eq!(images(&rendered, &list), images(&alone, &list));
+        assert_eq!(alone.area_factor.to_bits(), rendered.area_factor.to_bits());
+    }
+}
