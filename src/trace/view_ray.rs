@@ -19,11 +19,44 @@ impl Camera {
         let dv = [along(right * (step * half)), along(up * (-step * half))];
         (direction, Differential { dp: [Vec3::ZERO; 2], dv })
     }
+
+    /// Place in an image of `size` pixels where a point is seen, `y` down; None behind the camera.
+    ///
+    /// The inverse of [`Camera::ray`].
+    pub fn project(&self, point: Vec3, size: [u32; 2]) -> Option<[f32; 2]> {
+        let [right, up, forward] = self.frame;
+        let to = point - self.position;
+        let depth = to.dot(forward);
+        if depth <= 0.0 {
+            return None;
+        }
+        let step = 2.0 * self.tan_half_fov_y / size[1] as f32;
+        let x = size[0] as f32 / 2.0 + to.dot(right) / (depth * step);
+        let y = size[1] as f32 / 2.0 - to.dot(up) / (depth * step);
+        (x.is_finite() && y.is_finite()).then_some([x, y])
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn projection_is_the_inverse_of_the_ray() {
+        let camera = Camera {
+            position: Vec3::new(1.0, 2.0, 3.0),
+            frame: [Vec3::NEG_Z, Vec3::Y, Vec3::NEG_X],
+            tan_half_fov_y: 0.4,
+            resolution: [64, 48],
+        };
+        let size = [64, 48];
+        for (x, y) in [(0.0, 0.0), (11.3, 40.2), (70.0, -5.0)] {
+            let (v, _) = camera.ray(x, y, size, 0.5);
+            let [px, py] = camera.project(camera.position + v * 7.0, size).expect("before the camera");
+            assert!((px - x).abs() < 1e-3 && (py - y).abs() < 1e-3, "{px} {py}");
+            assert!(camera.project(camera.position - v, size).is_none());
+        }
+    }
 
     #[test]
     fn differential_is_the_derivative_of_the_direction() {

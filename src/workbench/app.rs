@@ -6,6 +6,7 @@ use super::areas::Areas;
 use super::desk::{Desk, Finding, Kind, Step};
 use super::document::{Change, Document, Opened};
 use super::gallery::Gallery;
+use super::inspector::{FoundPath, Inspected};
 use super::layout::{self, Pane};
 use super::messages::Messages;
 use super::panes::Panes;
@@ -80,6 +81,7 @@ impl Workbench {
         self.desk.flipped = ui.input(|i| i.key_down(egui::Key::B)) && !ui.ctx().text_edit_focused();
         self.desk.unfinished = false;
         self.desk.hover = None;
+        self.desk.inspector.begin();
         layout::fit(&mut self.tree, self.document.session.panels.len());
         bars::top(ui, &self.document, &self.render, &mut self.desk);
         let (document, gallery) = (&self.document, &self.gallery);
@@ -101,6 +103,7 @@ impl Workbench {
         dialogs::show(ui.ctx(), &mut self.document, &mut self.desk);
         self.take_dropped(ui.ctx());
         self.act();
+        self.look_into();
         let held = ui.input(|i| i.pointer.any_down());
         let change = self.document.settle(held);
         self.follow(change, Step::New);
@@ -154,6 +157,9 @@ impl Workbench {
             Finding::Image(path, Ok(image)) => self.gallery.put_file(&path, image),
             Finding::Image(_, Err(why)) => self.messages.error(why),
             Finding::Areas(areas) => self.desk.areas = areas,
+            Finding::Inspected(Ok(found)) => self.desk.inspector.take(*found),
+            Finding::Inspected(Err(why)) => self.messages.error(why),
+            Finding::Path(path) => self.desk.inspector.path = path,
             Finding::Errors(generation, errors) => {
                 if self.render.job().is_some_and(|j| j.generation == generation) {
                     for (estimator, point) in errors {
@@ -246,6 +252,44 @@ impl Workbench {
             });
             Finding::Errors(generation, points.collect())
         });
+    }
+
+    /// Asks for what the inspector lacks: the pinned pixel of the pass that it looks at, the chosen photon's path.
+    fn look_into(&mut self) {
+        let Some(pixel) = self.document.session.pins.last().copied() else {
+            if self.desk.inspector.found.is_some() {
+                self.desk.inspector.clear();
+            }
+            return;
+        };
+        let inspector = &mut self.desk.inspector;
+        let pass = if inspector.latest { &self.render.pass } else { &self.render.first_pass };
+        let size = self.document.settings().size;
+        let fits = pixel[0] < size[0] && pixel[1] < size[1];
+        if let (Some(pass), Some(job)) = (pass, self.render.job())
+            && !(self.render.draft && inspector.latest)
+            && fits
+        {
+            let wanted = (Arc::as_ptr(pass) as usize, pixel, job.estimators.clone());
+            if inspector.asked.as_ref() != Some(&wanted) {
+                let (pass, names) = (Arc::clone(pass), job.estimators.clone());
+                inspector.asked = Some(wanted);
+                self.analysis
+                    .ask(Kind::Inspect, move || Finding::Inspected(Inspected::new(&pass, &names, pixel).map(Box::new)));
+            }
+        }
+        let chosen = inspector.found.as_ref().and_then(|f| {
+            let row = f.inspection.rows.get(inspector.chosen?)?;
+            Some((Arc::clone(&f.pass), row.kind, row.index))
+        });
+        let has = inspector.path.as_ref().map(|p| p.photon);
+        match chosen {
+            None => inspector.path = None,
+            Some((pass, kind, index)) if has != Some((kind, index)) && !self.analysis.is_busy_with(&Kind::Path) => {
+                self.analysis.ask(Kind::Path, move || Finding::Path(FoundPath::new(&pass, kind, index)));
+            }
+            Some(_) => {}
+        }
     }
 
     /// Opens files that were dropped onto the window.

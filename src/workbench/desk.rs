@@ -3,6 +3,7 @@
 use super::actions::Action;
 use super::areas::Areas;
 use super::dialogs::Dialogs;
+use super::inspector::{FoundPath, Inspected, Inspector};
 use crate::measure::{ErrorMetrics, Reference};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -20,6 +21,10 @@ pub enum Kind {
     Errors,
     /// Histogram of footprint areas.
     Areas,
+    /// The pinned pixel.
+    Inspect,
+    /// A photon's path.
+    Path,
 }
 
 /// What the analysis thread has found.
@@ -34,6 +39,10 @@ pub enum Finding {
     Errors(u64, Vec<(String, ErrorPoint)>),
     /// Histogram of footprint areas.
     Areas(Areas),
+    /// The pinned pixel taken apart.
+    Inspected(Result<Box<Inspected>, String>),
+    /// The path of a photon.
+    Path(Option<FoundPath>),
 }
 
 /// How a scene that was opened comes into the history.
@@ -88,6 +97,8 @@ pub struct Desk {
     pub reference: Option<Arc<Reference>>,
     /// Error curves by estimator.
     pub errors: BTreeMap<String, Vec<ErrorPoint>>,
+    /// The inspector.
+    pub inspector: Inspector,
     /// Footprint areas of the last pass.
     pub areas: Areas,
     /// What the user asked for in this frame.

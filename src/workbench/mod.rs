@@ -17,6 +17,7 @@ pub mod edits;
 pub mod files;
 pub mod gallery;
 pub mod history;
+pub mod inspector;
 pub mod layout;
 pub mod messages;
 pub mod overlays;

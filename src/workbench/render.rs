@@ -19,6 +19,9 @@ pub struct Render {
     generation: u64,
     /// The pass whose tiles come in, or came last.
     pub pass: Option<Arc<Pass>>,
+    /// The first pass of the job that is rendered, kept for who looks into it.
+    pub first_pass: Option<Arc<Pass>>,
+    first_is_old: bool,
     /// Whether that pass is a draft.
     pub draft: bool,
     /// Where the render stands.
@@ -40,6 +43,8 @@ impl Render {
             job: None,
             generation: 0,
             pass: None,
+            first_pass: None,
+            first_is_old: true,
             draft: false,
             progress: None,
             finished: false,
@@ -62,6 +67,8 @@ impl Render {
         self.started = Instant::now();
         self.first_tile = None;
         self.progress = None;
+        // Until another comes, and none comes if all images are kept.
+        self.first_is_old = true;
         if self.worker.is_none() {
             match Worker::start(Arc::clone(&self.wake)) {
                 Ok(worker) => self.worker = Some(worker),
@@ -91,7 +98,12 @@ impl Render {
         worker.events(
             self.generation,
             |event| match event {
-                Event::PassStarted { pass, draft, .. } => (self.pass, self.draft) = (Some(pass), draft),
+                Event::PassStarted { pass, draft, .. } => {
+                    if !draft && std::mem::take(&mut self.first_is_old) {
+                        self.first_pass = Some(Arc::clone(&pass));
+                    }
+                    (self.pass, self.draft) = (Some(pass), draft);
+                }
                 Event::TileDone { rect, images, .. } => {
                     self.first_tile.get_or_insert_with(|| self.started.elapsed());
                     gallery.tile(rect, &images);

@@ -4,6 +4,7 @@ mod camera;
 mod display;
 mod estimators;
 mod image;
+mod inspector;
 mod messages;
 mod overlays;
 mod photons;
@@ -64,6 +65,7 @@ impl Behavior<Pane> for Panes<'_> {
                 Pane::ErrorPlot => plots::errors(self, ui),
                 Pane::TimePlot => plots::times(self, ui),
                 Pane::AreaPlot => plots::areas(self, ui),
+                Pane::Inspector => inspector::show(self, ui),
                 other => {
                     scroll.id_salt(other.title()).show(ui, |ui| match other {
                         Pane::Scene => scene::show(self, ui),
@@ -74,9 +76,7 @@ impl Behavior<Pane> for Panes<'_> {
                         Pane::Overlays => overlays::show(self, ui),
                         Pane::Plan => plan::show(self, ui),
                         Pane::Messages => messages::show(self, ui),
-                        _ => {
-                            ui.weak("Click a pixel to see why it has its value.");
-                        }
+                        _ => {}
                     });
                 }
             }

@@ -1,0 +1,93 @@
+//! The inspector's pane.
+
+use super::Panes;
+use super::widgets::choice;
+use crate::math::rgb::mean;
+use crate::workbench::inspector::{plane, summary, table};
+use crate::workbench::theme::{self, mono, number};
+use egui::{Color32, Ui};
+use std::sync::Arc;
+
+pub(super) fn show(panes: &mut Panes, ui: &mut Ui) {
+    let Some(pixel) = panes.document.session.pins.last().copied() else {
+        ui.weak("Click a pixel to see why it has its value. Arrows move the pin, Ctrl+G goes to a pixel.");
+        return;
+    };
+    ui.horizontal_wrapped(|ui| {
+        ui.strong(format!("pixel {}, {}", pixel[0], pixel[1]));
+        let tip = "photons differ from pass to pass; the first stays as it is while the render goes on";
+        ui.selectable_value(&mut panes.desk.inspector.latest, false, "first pass").on_hover_text(tip);
+        ui.selectable_value(&mut panes.desk.inspector.latest, true, "latest").on_hover_text(tip);
+    });
+    let Some(found) = panes.desk.inspector.found.clone() else {
+        ui.weak("Waiting for a pass.");
+        return;
+    };
+    let i = &found.inspection;
+    let names: Vec<&str> = i.estimators.iter().map(|e| e.name.as_str()).collect();
+    let colors: Vec<Color32> = (0..names.len()).map(|e| theme::panel_color(&names, e)).collect();
+    let inspector = &mut panes.desk.inspector;
+    egui::Grid::new("inspector choices").num_columns(2).show(ui, |ui| {
+        if i.hits.len() > 1 {
+            let titles: Vec<String> = (0..i.hits.len()).map(|h| hit_title(&found, h)).collect();
+            let titles: Vec<&str> = titles.iter().map(String::as_str).collect();
+            let mut title = titles.get(inspector.hit).copied().unwrap_or("").to_owned();
+            if choice(ui, "Hit", "surface at which photons are gathered", &mut title, &titles) {
+                inspector.hit = titles.iter().position(|t| *t == title).unwrap_or(0);
+            }
+        }
+        let mut name = names.get(inspector.estimator).copied().unwrap_or("").to_owned();
+        let tip = "whose sampling points and polygons are drawn for the photon under the pointer";
+        if choice(ui, "Drawn for", tip, &mut name, &names) {
+            inspector.estimator = names.iter().position(|n| *n == name).unwrap_or(0);
+        }
+    });
+    if i.hits.is_empty() {
+        ui.weak("No view ray of this pixel meets a diffuse surface that photons light.");
+    }
+    plane::show(ui, inspector, &found, 240.0_f32.min(ui.available_height() * 0.45));
+    sums(ui, &found, &colors);
+    ui.horizontal(|ui| {
+        ui.label(mono(format!("{} photons", i.rows.len())));
+        if ui.small_button("Copy as CSV").on_hover_text("the photon table, all columns").clicked() {
+            ui.ctx().copy_text(summary::csv(&found));
+        }
+    });
+    let inspector = &mut panes.desk.inspector;
+    table::show(ui, inspector, &found, &colors);
+}
+
+fn hit_title(found: &Arc<crate::workbench::inspector::Inspected>, hit: usize) -> String {
+    let h = &found.inspection.hits[hit];
+    let depth = found.inspection.path.get(h.vertex).map_or(0, |v| v.depth);
+    let rays = if h.rays_per_axis > 1 {
+        format!(", {0}×{0} rays, cell {1}", h.rays_per_axis, h.cell + 1)
+    } else {
+        String::new()
+    };
+    format!("{}: after {depth} bounces{rays}", hit + 1)
+}
+
+/// For each estimator: light without photons, the rows' sum, and the pixel of the pass.
+fn sums(ui: &mut Ui, found: &crate::workbench::inspector::Inspected, colors: &[Color32]) {
+    egui::Grid::new("sums").num_columns(4).striped(true).show(ui, |ui| {
+        for (title, tip) in [
+            ("", ""),
+            ("no photons", "direct light by shadow rays, and lights that are seen; mean channel, W/(m² sr)"),
+            ("+ rows", "sum of the table's contributions"),
+            ("= pixel", "the pixel of this pass's image, by the code that renders"),
+        ] {
+            ui.weak(title).on_hover_text(tip);
+        }
+        ui.end_row();
+        for (e, estimator) in found.inspection.estimators.iter().enumerate() {
+            ui.colored_label(colors[e], mono(estimator.name.split(':').next().unwrap_or("")).color(colors[e]));
+            let base = f64::from(mean(estimator.base));
+            let rows = f64::from(mean(found.inspection.sum(e))) - base;
+            ui.label(mono(number(base)));
+            ui.label(mono(number(rows)));
+            ui.label(mono(number(f64::from(mean(estimator.value)))));
+            ui.end_row();
+        }
+    });
+}
