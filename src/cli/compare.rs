@@ -2,7 +2,7 @@
 
 use crate::cli::compare_table::text;
 use crate::cli::failure::Failure;
-use crate::cli::flags::{CommonFlags, rect};
+use crate::cli::flags::{CommonFlags, check_crop, rect};
 use crate::cli::progress::{ProgressWatch, bar, interrupted, listen_for_interrupts};
 use crate::cli::table::percent;
 use crate::cli::{print, to_json};
@@ -54,8 +54,8 @@ pub struct CompareArgs {
     /// Where errors are taken against regular with 16×16 view rays
     #[arg(long, value_enum, default_value = "crop")]
     truth: Truth,
-    /// Image to compare with (EXR, linear radiance), instead of a built-in scene's own
-    #[arg(long, value_name = "R.exr")]
+    /// Image to compare with (EXR of linear radiance, or PNG, decoded from sRGB), instead of a built-in scene's own
+    #[arg(long, value_name = "R")]
     reference: Option<PathBuf>,
     /// Pixels of the reference that count (PNG, white)
     #[arg(long, value_name = "M.png", requires = "reference")]
@@ -116,12 +116,8 @@ impl<'a> Comparison<'a> {
             (Some(list), _) | (None, Some(list)) => registry::estimators(list)?,
             (None, None) => ESTIMATORS.iter().filter_map(|e| e.default_estimator()).collect(),
         };
-        if let Some(c) = args.crop {
-            let fits = |at: u32, length: u32, size: u32| u64::from(at) + u64::from(length) <= u64::from(size);
-            let [w, h] = settings.size;
-            if !fits(c.x, c.width, w) || !fits(c.y, c.height, h) {
-                return Err(Failure::Call(format!("--crop: leaves the image of {w}x{h} pixels")));
-            }
+        if let Some(crop) = args.crop {
+            check_crop(crop, settings.size)?;
         }
         let reference = match &args.reference {
             Some(path) => Some(Reference::from_files(path, args.mask.as_deref()).map_err(Failure::Call)?),

@@ -2,6 +2,7 @@
 
 pub mod compare;
 mod compare_table;
+pub mod diff;
 pub mod failure;
 pub mod flags;
 pub mod lists;
@@ -33,6 +34,8 @@ enum Command {
     Compare(compare::CompareArgs),
     /// One estimator, one image
     Render(render::RenderArgs),
+    /// Every metric of an image against another, and the difference image
+    Diff(diff::DiffArgs),
     /// The built-in scenes
     Scenes(lists::ListArgs),
     /// The estimators and their settings
@@ -57,6 +60,7 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
     let result = match cli.command {
         Some(Command::Compare(args)) => compare::run(&args),
         Some(Command::Render(args)) => render::run(&args),
+        Some(Command::Diff(args)) => diff::run(&args),
         Some(Command::Scenes(args)) => lists::scenes(&args),
         Some(Command::Estimators(args)) => lists::estimators(&args),
         None => {
