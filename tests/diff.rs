@@ -40,7 +40,7 @@ fn json(args: &[&str]) -> Value {
 }
 
 fn number(json: &Value, key: &str) -> f64 {
-    json.pointer(key).and_then(Value::as_f64).unwrap_or_else(|| panic!("{key} in {json}"))
+    json.pointer(key).and_then(Value::as_f64).expect(key)
 }
 
 fn image(size: [u32; 2], pixel: impl Fn(u32, u32) -> Vec3) -> Image {
@@ -193,7 +193,7 @@ fn a_png_is_compared_as_linear_values() {
 fn wrong_calls_are_refused_in_one_line() {
     let folder = tempfile::tempdir().expect("a folder");
     let [a, b] = pair();
-    let mut broken = b.clone();
+    let mut broken = b;
     broken.pixels[16 * 3 + 5].y = f32::NAN;
     let a = write(folder.path(), "a.exr", &a);
     let broken = write(folder.path(), "broken.exr", &broken);

@@ -238,8 +238,9 @@ impl Pair {
         let mut rgb = Vec::new();
         for y in part.y..part.y + part.height {
             let start = y as usize * self.image.size[0] as usize + part.x as usize;
-            for at in start..start + part.width as usize {
-                rgb.extend(if self.mask.counts[at] { scale.color(values[at]) } else { BACKGROUND });
+            let row = start..start + part.width as usize;
+            for (value, counts) in values[row.clone()].iter().zip(&self.mask.counts[row]) {
+                rgb.extend(if *counts { scale.color(*value) } else { BACKGROUND });
             }
         }
         let width = part.width.max(NARROWEST);

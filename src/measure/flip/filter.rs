@@ -24,7 +24,7 @@ pub type Taps = Vec<f64>;
 
 impl Plane {
     /// Filters rows with `across`, then columns with `down`. The same bits on any number of threads.
-    pub fn filtered(&self, across: &Taps, down: &Taps) -> Self {
+    pub fn filtered(&self, across: &[f64], down: &[f64]) -> Self {
         let [width, height] = self.size;
         if width == 0 || height == 0 {
             return self.clone();
@@ -59,7 +59,7 @@ impl Plane {
     }
 }
 
-fn filter_row(from: &[f32], taps: &Taps, to: &mut [f32]) {
+fn filter_row(from: &[f32], taps: &[f64], to: &mut [f32]) {
     let radius = taps.len() / 2;
     let (first, last) = (from[0], from[from.len() - 1]);
     let line: Vec<f64> = std::iter::repeat_n(first, radius)
@@ -110,8 +110,9 @@ pub fn features(grey: &Plane, pixels_per_degree: f64) -> [Plane; 2] {
     let smooth: Taps = offsets(radius).map(gaussian).collect();
     let sum: f64 = smooth.iter().sum();
     let smooth: Taps = smooth.iter().map(|t| t / sum).collect();
-    let edge = balanced(offsets(radius).map(|x| -x * gaussian(x)).collect());
-    let point = balanced(offsets(radius).map(|x| (x * x / (deviation * deviation) - 1.0) * gaussian(x)).collect());
+    let edge = balanced(&offsets(radius).map(|x| -x * gaussian(x)).collect::<Taps>());
+    let point =
+        balanced(&offsets(radius).map(|x| (x * x / (deviation * deviation) - 1.0) * gaussian(x)).collect::<Taps>());
     [edge, point].map(|taps| {
         let (across, down) = (grey.filtered(&taps, &smooth), grey.filtered(&smooth, &taps));
         let values = across.values.iter().zip(&down.values);
@@ -124,7 +125,7 @@ pub fn features(grey: &Plane, pixels_per_degree: f64) -> [Plane; 2] {
 }
 
 /// Weights whose positive ones sum to 1 and whose negative ones sum to -1.
-fn balanced(taps: Taps) -> Taps {
+fn balanced(taps: &[f64]) -> Taps {
     let positive: f64 = taps.iter().filter(|t| **t > 0.0).sum();
     let negative: f64 = -taps.iter().filter(|t| **t < 0.0).sum::<f64>();
     taps.iter().map(|&t| if t > 0.0 { t / positive } else { t / negative }).collect()
@@ -144,13 +145,13 @@ mod tests {
 
     #[test]
     fn the_nearest_pixel_counts_beyond_the_border() {
-        let shift_left = vec![0.0, 0.0, 1.0];
-        let same = vec![1.0];
+        let shift_left = [0.0, 0.0, 1.0];
+        let same = [1.0];
         let p = plane([3, 2], &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
         assert_eq!(p.filtered(&shift_left, &same).values, [2.0, 3.0, 3.0, 5.0, 6.0, 6.0]);
         assert_eq!(p.filtered(&same, &shift_left).values, [4.0, 5.0, 6.0, 4.0, 5.0, 6.0]);
         // Weights that reach far beyond a single pixel.
-        assert_eq!(plane([1, 1], &[8.0]).filtered(&vec![0.125; 7], &vec![0.5; 5]).values, [17.5]);
+        assert_eq!(plane([1, 1], &[8.0]).filtered(&[0.125; 7], &[0.5; 5]).values, [17.5]);
     }
 
     #[test]
