@@ -2,7 +2,7 @@
 
 use crate::cli::compare_table::text;
 use crate::cli::failure::Failure;
-use crate::cli::flags::{CommonFlags, rect};
+use crate::cli::flags::{CommonFlags, check_crop, rect};
 use crate::cli::progress::{ProgressWatch, bar, interrupted, listen_for_interrupts};
 use crate::cli::table::percent;
 use crate::cli::window::session;
@@ -56,8 +56,8 @@ pub struct CompareArgs {
     /// Where errors are taken against regular with 16×16 view rays
     #[arg(long, value_enum, default_value = "crop")]
     truth: Truth,
-    /// Image to compare with (EXR, linear radiance), instead of a built-in scene's own
-    #[arg(long, value_name = "R.exr")]
+    /// Image to compare with (EXR of linear radiance, or PNG, decoded from sRGB), instead of a built-in scene's own
+    #[arg(long, value_name = "R")]
     reference: Option<PathBuf>,
     /// Pixels of the reference that count (PNG, white)
     #[arg(long, value_name = "M.png", requires = "reference")]
@@ -137,12 +137,8 @@ impl<'a> Comparison<'a> {
             return Err(Failure::Call(format!("{}: no panel has an estimator; give --estimators", args.scene)));
         }
         let crop = args.crop.or(session.crop_rect());
-        if let Some(c) = crop {
-            let fits = |at: u32, length: u32, size: u32| u64::from(at) + u64::from(length) <= u64::from(size);
-            let [w, h] = settings.size;
-            if !fits(c.x, c.width, w) || !fits(c.y, c.height, h) {
-                return Err(Failure::Call(format!("--crop: leaves the image of {w}x{h} pixels")));
-            }
+        if let Some(crop) = crop {
+            check_crop(crop, settings.size)?;
         }
         let given = args.reference.clone().or(session.reference.as_ref().map(PathBuf::from));
         let mask = if args.reference.is_some() { args.mask.clone() } else { session.mask.as_ref().map(PathBuf::from) };

@@ -187,6 +187,20 @@ pub fn rect(text: &str) -> Result<Rect, String> {
     }
 }
 
+/// Checks that `--crop` lies inside an image of `size` pixels.
+///
+/// # Errors
+/// If it does not.
+pub fn check_crop(crop: Rect, size: [u32; 2]) -> Result<(), Failure> {
+    let fits = |at: u32, length: u32, size: u32| u64::from(at) + u64::from(length) <= u64::from(size);
+    let [w, h] = size;
+    if fits(crop.x, crop.width, w) && fits(crop.y, crop.height, h) {
+        Ok(())
+    } else {
+        Err(Failure::Call(format!("--crop: leaves the image of {w}x{h} pixels")))
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

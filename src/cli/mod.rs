@@ -2,6 +2,7 @@
 
 pub mod compare;
 mod compare_table;
+pub mod diff;
 pub mod failure;
 pub mod flags;
 pub mod inspect;
@@ -39,6 +40,8 @@ enum Command {
     Render(render::RenderArgs),
     /// Why a pixel has its value: its view path, its photons, their weights under each estimator, the plan
     Inspect(inspect::InspectArgs),
+    /// Every metric of an image against another, and the difference image
+    Diff(diff::DiffArgs),
     /// The built-in scenes
     Scenes(lists::ListArgs),
     /// The estimators and their settings
@@ -64,6 +67,7 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
         Some(Command::Compare(args)) => compare::run(&args),
         Some(Command::Render(args)) => render::run(&args),
         Some(Command::Inspect(args)) => inspect::run(&args),
+        Some(Command::Diff(args)) => diff::run(&args),
         Some(Command::Scenes(args)) => lists::scenes(&args),
         Some(Command::Estimators(args)) => lists::estimators(&args),
         None => window::run(cli.scene.unwrap_or_else(|| "ring".into()), cli.flags),

@@ -14,6 +14,14 @@ use std::path::Path;
 /// # Errors
 /// If the file cannot be written.
 pub fn write(path: &Path, image: &Image, provenance: &Provenance) -> Result<(), WriteError> {
+    write_with(path, image, &provenance.pairs())
+}
+
+/// As [`write`], with these facts in the header.
+///
+/// # Errors
+/// If the file cannot be written.
+pub fn write_with(path: &Path, image: &Image, facts: &[(&str, String)]) -> Result<(), WriteError> {
     let wrong = |why: String| WriteError { path: path.to_owned(), why };
     let [w, h] = image.size;
     let channels = SpecificChannels::rgb(|Vec2(x, y)| {
@@ -22,7 +30,7 @@ pub fn write(path: &Path, image: &Image, provenance: &Provenance) -> Result<(), 
     });
     // One attribute: the library keeps them without an order, and the same image should give the same bytes.
     let mut attributes = LayerAttributes::default();
-    let facts: Vec<String> = provenance.pairs().iter().map(|(k, v)| format!("{k} = {v}")).collect();
+    let facts: Vec<String> = facts.iter().map(|(k, v)| format!("{k} = {v}")).collect();
     attributes.other.insert(Text::from("cusp"), AttributeValue::Text(ascii(&facts.join("\n"))));
     let layer = Layer::new((w as usize, h as usize), attributes, Encoding::SMALL_LOSSLESS, channels);
     let mut bytes = Vec::new();

@@ -1,6 +1,7 @@
 //! Files: images, crops, sheets, tables and reports, written whole or not at all.
 
 pub mod exr_file;
+pub mod false_color;
 pub mod png_file;
 pub mod provenance;
 pub mod report;

@@ -3,6 +3,14 @@
 use crate::scene::Scene;
 use serde::Serialize;
 
+/// The command line of this process.
+pub fn command_line() -> String {
+    let mut words = std::env::args_os().map(|a| a.to_string_lossy().into_owned());
+    // The program's own path says nothing about the result.
+    words.next();
+    std::iter::once("cusp".to_owned()).chain(words).collect::<Vec<_>>().join(" ")
+}
+
 /// Facts that let a reader make a file again.
 #[derive(Clone, Debug, Serialize)]
 pub struct Provenance {
@@ -21,12 +29,9 @@ pub struct Provenance {
 impl Provenance {
     /// Of a scene rendered with that seed by the command line of this process.
     pub fn new(scene: &Scene, seed: u64) -> Self {
-        let mut words = std::env::args_os().map(|a| a.to_string_lossy().into_owned());
-        // The program's own path says nothing about the result.
-        words.next();
         Self {
             version: env!("CARGO_PKG_VERSION").into(),
-            command: std::iter::once("cusp".to_owned()).chain(words).collect::<Vec<_>>().join(" "),
+            command: command_line(),
             seed,
             scene: scene.name.clone(),
             scene_hash: format!("{:016x}", scene.hash),

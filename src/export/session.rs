@@ -1,6 +1,7 @@
 //! Sessions: a comparison as a file, with everything that reopens the window as it was.
 
 use crate::estimate::{Estimator, registry};
+pub use crate::measure::difference::Difference;
 use crate::render::film::Rect;
 use crate::scene::scene_file::{CameraFile, LightFile, MaterialFile, RenderFile, SceneFile};
 use crate::scene::{SceneError, Source};
@@ -126,21 +127,6 @@ pub enum Mode {
     Split,
     /// Each shows its difference to the other.
     Difference,
-}
-
-/// Which difference is shown.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Difference {
-    /// x - r.
-    #[default]
-    Signed,
-    /// |x - r|.
-    Absolute,
-    /// (x - r) / (|r| + ε).
-    Relative,
-    /// FLIP.
-    Flip,
 }
 
 /// From radiance to the screen: the same for all panels.

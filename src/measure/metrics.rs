@@ -1,7 +1,8 @@
 //! Error of an image against a reference.
 
 use crate::math::rgb::Rgb;
-use crate::render::film::Image;
+use crate::measure::trimmed::trimmed_mean;
+use crate::render::film::{Image, Rect};
 use glam::DVec3;
 use serde::Serialize;
 
@@ -19,9 +20,22 @@ impl Mask {
     pub fn all(size: [u32; 2]) -> Self {
         Self { size, counts: vec![true; size[0] as usize * size[1] as usize] }
     }
+
+    /// The pixels of this mask that lie in `rect`.
+    pub fn within(&self, rect: Rect) -> Self {
+        let inside = |v: u32, start: u32, length: u32| v >= start && v - start < length;
+        let pixels = (0..self.size[1]).flat_map(|y| (0..self.size[0]).map(move |x| (x, y)));
+        let counts = pixels
+            .zip(&self.counts)
+            .map(|((x, y), c)| *c && inside(x, rect.x, rect.width) && inside(y, rect.y, rect.height))
+            .collect();
+        Self { size: self.size, counts }
+    }
 }
 
-/// Errors over the pixels that count. Each is a mean over pixels and channels.
+/// Errors of an image `x` against a reference `r` over the pixels that count. Means are over pixels and channels.
+///
+/// All are finite for finite images; what would overflow is `f64::MAX`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct ErrorMetrics {
     /// Mean squared error, (W/(m² sr))².
@@ -32,6 +46,16 @@ pub struct ErrorMetrics {
     pub relative_rmse: f64,
     /// `mean((x - r)²/(r² + ε))` with `ε = (0.01 mean r)²`.
     pub relative_mse: f64,
+    /// [`Self::mse`] without the worst 0.1 % of the pixels, rounded down; a pixel's error is the mean over its channels.
+    pub trimmed_mse: f64,
+    /// [`Self::relative_mse`] without the worst 0.1 % of the pixels, rounded down; `ε` is that of all that count.
+    pub trimmed_relative_mse: f64,
+    /// Symmetric mean absolute percentage error, 0 to 2: `mean(|x - r|/((|x| + |r|)/2))`, with 0/0 = 0.
+    pub smape: f64,
+    /// Mean signed error `mean(x - r)`, W/(m² sr): above 0 if the image is too bright.
+    pub bias: f64,
+    /// Largest `|x - r|` of a channel of a pixel, W/(m² sr).
+    pub max_error: f64,
     /// Mean of the image over the reference's; 1 if both vanish.
     pub mean_ratio: f64,
     /// Pixels that counted.
@@ -63,12 +87,15 @@ pub fn compare(image: &Image, reference: &Image, mask: &Mask) -> Result<ErrorMet
         return Err("the mask leaves no pixel".into());
     }
     let n = 3.0 * pixels as f64;
-    let sum = |v: DVec3| v.element_sum();
-    let mean = |f: fn((DVec3, DVec3)) -> DVec3| counted().map(|p| sum(f(p))).sum::<f64>() / n;
-    let (own, reference_mean) = (mean(|(x, _)| x), mean(|(_, r)| r));
-    let mse = mean(|(x, r)| (x - r) * (x - r));
+    let mean = |f: fn(DVec3, DVec3) -> DVec3| counted().map(|(x, r)| f(x, r).element_sum()).sum::<f64>() / n;
+    let (own, reference_mean) = (mean(|x, _| x), mean(|_, r| r));
+    let mse = mean(|x, r| (x - r) * (x - r));
     let epsilon = (0.01 * reference_mean).powi(2).max(f64::MIN_POSITIVE);
-    let relative_mse = counted().map(|(x, r)| sum((x - r) * (x - r) / (r * r + epsilon))).sum::<f64>() / n;
+    let relative = |(x, r): (DVec3, DVec3)| ((x - r) * (x - r) / (r * r + epsilon)).element_sum();
+    let trimmed = |pixel: &dyn Fn((DVec3, DVec3)) -> f64| {
+        let errors: Vec<f64> = counted().map(|p| pixel(p) / 3.0).collect();
+        trimmed_mean(&errors).min(f64::MAX)
+    };
     let over = |a: f64, zero: f64| {
         if reference_mean > 0.0 {
             a / reference_mean
@@ -82,10 +109,21 @@ pub fn compare(image: &Image, reference: &Image, mask: &Mask) -> Result<ErrorMet
         mse,
         rmse: mse.sqrt(),
         relative_rmse: over(mse.sqrt(), 0.0),
-        relative_mse,
+        relative_mse: (counted().map(relative).sum::<f64>() / n).min(f64::MAX),
+        trimmed_mse: trimmed(&|(x, r)| ((x - r) * (x - r)).element_sum()),
+        trimmed_relative_mse: trimmed(&relative),
+        smape: mean(symmetric),
+        bias: mean(|x, r| x - r),
+        max_error: counted().map(|(x, r)| (x - r).abs().max_element()).fold(0.0, f64::max),
         mean_ratio: over(own, 1.0),
         pixels,
     })
+}
+
+/// `|x - r|/((|x| + |r|)/2)` for each channel; 0 where both vanish.
+fn symmetric(x: DVec3, r: DVec3) -> DVec3 {
+    let part = |x: f64, r: f64| if x == 0.0 && r == 0.0 { 0.0 } else { 2.0 * (x - r).abs() / (x.abs() + r.abs()) };
+    DVec3::new(part(x.x, r.x), part(x.y, r.y), part(x.z, r.z))
 }
 
 /// Averages blocks of `n`×`n` pixels over those that count; a block counts if at least half of its pixels do.
@@ -148,6 +186,48 @@ mod tests {
         let epsilon = 0.02f64 * 0.02;
         assert!((e.relative_mse - 2.5 / (4.0 + epsilon)).abs() < 1e-12);
         assert!((e.mean_ratio - 1.25).abs() < 1e-12 && e.pixels == 2);
+        // 1/1.5 and 2/3, the signs of the errors differ.
+        assert!((e.smape - 2.0 / 3.0).abs() < 1e-12);
+        assert_eq!((e.bias, e.max_error, e.trimmed_mse), (0.5, 2.0, e.mse));
+        assert!((e.trimmed_relative_mse - e.relative_mse).abs() < 1e-12);
+    }
+
+    #[test]
+    fn channels_count_one_by_one() {
+        let image = Image { size: [1, 1], pixels: vec![Rgb::new(0.0, 3.0, -1.0)] };
+        let reference = Image { size: [1, 1], pixels: vec![Rgb::new(0.0, 1.0, 1.0)] };
+        let e = compare(&image, &reference, &Mask::all([1, 1])).expect("same size");
+        // 0/0, 2/2 and 2/1.
+        assert_eq!((e.smape, e.bias, e.max_error), (1.0, 0.0, 2.0));
+        assert!((e.mse - 8.0 / 3.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn one_firefly_in_a_thousand_does_not_count_as_trimmed() {
+        let mut image = grey([40, 25], &[1.5; 1000]);
+        image.pixels[77] = Rgb::splat(1e4);
+        let e = compare(&image, &grey([40, 25], &[1.0; 1000]), &Mask::all([40, 25])).expect("same size");
+        assert!((e.trimmed_mse - 0.25).abs() < 1e-12 && (e.trimmed_relative_mse - 0.25 / 1.0001).abs() < 1e-12);
+        assert!(e.mse > 9e4 && e.max_error == 9999.0);
+    }
+
+    #[test]
+    fn a_crop_counts_its_pixels_of_the_mask() {
+        let mut mask = Mask::all([4, 3]);
+        mask.counts[5] = false;
+        let counts = mask.within(Rect { x: 1, y: 1, width: 2, height: 9 }).counts;
+        let expected = [0, 0, 0, 0, 0, 0, 1, 0, 0, 1, 1, 0].map(|c| c == 1);
+        assert_eq!(counts, expected);
+    }
+
+    #[test]
+    fn nothing_overflows() {
+        let (huge, black) = (grey([1, 2], &[3e38, 1.0]), grey([1, 2], &[0.0, 0.0]));
+        for (x, r) in [(&huge, &black), (&black, &huge)] {
+            let e = compare(x, r, &Mask::all([1, 2])).expect("same size");
+            let all = [e.mse, e.rmse, e.relative_rmse, e.relative_mse, e.trimmed_mse, e.trimmed_relative_mse];
+            assert!(all.iter().chain(&[e.smape, e.bias, e.max_error, e.mean_ratio]).all(|v| v.is_finite()), "{e:?}");
+        }
     }
 
     #[test]

@@ -1,8 +1,13 @@
 //! Error metrics and the references that they are taken against.
 
+pub mod difference;
+pub mod flip;
+pub mod image_file;
 pub mod metrics;
 pub mod reference;
+pub mod trimmed;
 pub mod window;
 
+pub use difference::Difference;
 pub use metrics::{ErrorMetrics, Mask};
 pub use reference::Reference;

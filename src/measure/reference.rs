@@ -1,9 +1,9 @@
 //! Reference images: those of the binary, and those that a user gives.
 
+use crate::measure::image_file;
 use crate::measure::metrics::{self, ErrorMetrics, Mask};
 use crate::render::film::Image;
 use crate::scene::built_in;
-use image::DynamicImage;
 use std::path::Path;
 
 /// An image to compare with, and where it counts.
@@ -26,32 +26,21 @@ impl Reference {
         let Some((exr, png)) = built_in::find(name).and_then(|b| b.reference) else {
             return Ok(None);
         };
-        let decode = |bytes| image::load_from_memory(bytes).map_err(|e| e.to_string());
         Ok(Some(Self {
             source: format!("built-in reference of {name} (Mitsuba 3.9.1)"),
-            image: linear(&decode(exr)?),
-            mask: mask_of(&decode(png)?),
+            image: image_file::decode(exr)?,
+            mask: image_file::decode_mask(png)?,
         }))
     }
 
-    /// A reference from files; without a mask all pixels count.
+    /// A reference from files, EXR or PNG (see [`image_file::read`]); without a mask all pixels count.
     ///
     /// # Errors
     /// A file that cannot be read, or a mask of another size.
     pub fn from_files(reference: &Path, mask: Option<&Path>) -> Result<Self, String> {
-        let open = |path: &Path| {
-            image::ImageReader::open(path)
-                .map_err(|e| format!("{}: {e}", path.display()))?
-                .decode()
-                .map_err(|e| format!("{}: {e}", path.display()))
-        };
-        let is_exr = reference.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr"));
-        if !is_exr {
-            return Err(format!("{}: a reference must hold linear radiance; give an EXR", reference.display()));
-        }
-        let image = linear(&open(reference)?);
+        let image = image_file::read(reference).map_err(|e| e.to_string())?;
         let mask = match mask {
-            Some(path) => mask_of(&open(path)?),
+            Some(path) => image_file::read_mask(path).map_err(|e| e.to_string())?,
             None => Mask::all(image.size),
         };
         if mask.size != image.size {
@@ -82,16 +71,6 @@ impl Reference {
             metrics::compare(&image.resampled(self.image.size), &self.image, &self.mask)
         }
     }
-}
-
-fn linear(image: &DynamicImage) -> Image {
-    let rgb = image.to_rgb32f();
-    Image { size: [rgb.width(), rgb.height()], pixels: rgb.pixels().map(|p| p.0.into()).collect() }
-}
-
-fn mask_of(image: &DynamicImage) -> Mask {
-    let grey = image.to_luma8();
-    Mask { size: [grey.width(), grey.height()], counts: grey.pixels().map(|p| p.0[0] >= 128).collect() }
 }
 
 #[cfg(test)]
