@@ -80,7 +80,7 @@ impl Workbench {
         }
         self.desk.flipped = ui.input(|i| i.key_down(egui::Key::B)) && !ui.ctx().text_edit_focused();
         self.desk.unfinished = false;
-        self.desk.hover = None;
+        self.desk.hover_before = self.desk.hover.take();
         self.desk.inspector.begin();
         layout::fit(&mut self.tree, self.document.session.panels.len());
         bars::top(ui, &self.document, &self.render, &mut self.desk);
@@ -104,6 +104,8 @@ impl Workbench {
         self.take_dropped(ui.ctx());
         self.act();
         self.look_into();
+        self.ask_values();
+        self.ask_photons();
         let held = ui.input(|i| i.pointer.any_down());
         let change = self.document.settle(held);
         self.follow(change, Step::New);
@@ -157,6 +159,12 @@ impl Workbench {
             Finding::Image(path, Ok(image)) => self.gallery.put_file(&path, image),
             Finding::Image(_, Err(why)) => self.messages.error(why),
             Finding::Areas(areas) => self.desk.areas = areas,
+            Finding::Values(panel, Ok(values)) => drop(self.gallery.values.insert(panel, values)),
+            Finding::Values(panel, Err(why)) => {
+                self.gallery.values.remove(&panel);
+                self.messages.error(why);
+            }
+            Finding::Photons(photons) => self.desk.visible_photons = photons,
             Finding::Inspected(Ok(found)) => self.desk.inspector.take(*found),
             Finding::Inspected(Err(why)) => self.messages.error(why),
             Finding::Path(path) => self.desk.inspector.path = path,

@@ -177,11 +177,21 @@ pub fn gravity_color(gravity: Gravity) -> Color32 {
 pub fn readout(document: &Document, gallery: &Gallery, desk: &Desk) -> Option<String> {
     let pixel = desk.hover.map(|h| h.pixel).or_else(|| document.session.pins.last().copied())?;
     let mut text = format!("{}, {}", pixel[0], pixel[1]);
-    for panel in &document.session.panels {
+    for (i, panel) in document.session.panels.iter().enumerate() {
         let Some(value) = gallery.of(panel).and_then(|i| i.at(pixel)) else { continue };
+        let number_of = gallery.values.get(&i).and_then(|v| Some((v.at(pixel)?, v)));
         let name = panel.image.as_deref().unwrap_or(&panel.estimator).split(':').next().unwrap_or("");
         let [r, g, b] = value.to_array().map(|x| number(f64::from(x)));
         let _ = write!(text, "  {name} {r} {g} {b} Y {}", number(f64::from(luminance(value))));
+        if let Some((x, v)) = number_of {
+            let _ = write!(
+                text,
+                " [{} {}{}]",
+                v.title,
+                number(f64::from(x)),
+                if v.unit.is_empty() { String::new() } else { format!(" {}", v.unit) }
+            );
+        }
     }
     Some(text)
 }

@@ -3,7 +3,9 @@
 use super::actions::Action;
 use super::areas::Areas;
 use super::dialogs::Dialogs;
+use super::gallery::values::{Origin, Values};
 use super::inspector::{FoundPath, Inspected, Inspector};
+use super::overlays::photons::VisiblePhotons;
 use crate::measure::{ErrorMetrics, Reference};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -21,6 +23,10 @@ pub enum Kind {
     Errors,
     /// Histogram of footprint areas.
     Areas,
+    /// Numbers of a panel.
+    Values(usize),
+    /// Photons that the camera sees.
+    Photons,
     /// The pinned pixel.
     Inspect,
     /// A photon's path.
@@ -39,6 +45,10 @@ pub enum Finding {
     Errors(u64, Vec<(String, ErrorPoint)>),
     /// Histogram of footprint areas.
     Areas(Areas),
+    /// Numbers of a panel.
+    Values(usize, Result<Values, String>),
+    /// Photons that the camera sees.
+    Photons(VisiblePhotons),
     /// The pinned pixel taken apart.
     Inspected(Result<Box<Inspected>, String>),
     /// The path of a photon.
@@ -83,6 +93,8 @@ pub struct Hover {
 pub struct Desk {
     /// What lies under the pointer.
     pub hover: Option<Hover>,
+    /// What lay there in the frame before.
+    pub hover_before: Option<Hover>,
     /// Dialogs.
     pub dialogs: Dialogs,
     /// A panel that fills the middle.
@@ -99,6 +111,12 @@ pub struct Desk {
     pub errors: BTreeMap<String, Vec<ErrorPoint>>,
     /// The inspector.
     pub inspector: Inspector,
+    /// What each panel's numbers were asked for last.
+    pub asked_values: BTreeMap<usize, Origin>,
+    /// Photons that the camera sees, for the overlay.
+    pub visible_photons: VisiblePhotons,
+    /// The pass that they are of, by its address.
+    pub photons_of: Option<usize>,
     /// Footprint areas of the last pass.
     pub areas: Areas,
     /// What the user asked for in this frame.

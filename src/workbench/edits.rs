@@ -5,6 +5,7 @@ use super::desk::Desk;
 use super::dialogs::Dialog;
 use super::gallery::Gallery;
 use crate::estimate::registry;
+use crate::export::false_color::ColorMap;
 use crate::export::session::{Difference, Mode, Panel, Session, View};
 
 /// Zoom of the keys, if nothing else says where.
@@ -41,6 +42,12 @@ pub fn apply(action: &Action, session: &mut Session, desk: &mut Desk, gallery: &
         Action::AutoExposure => {
             session.tone.auto = !session.tone.auto;
             session.tone.exposure = desk.auto_exposure;
+        }
+        Action::FalseColor => {
+            let names: Vec<&str> = ColorMap::ALL.iter().map(|m| m.name()).collect();
+            let at = session.tone.false_color.as_ref().and_then(|n| names.iter().position(|m| m == n));
+            let next = at.map_or(0, |i| i + 1);
+            session.tone.false_color = names.get(next).map(|n| (*n).to_owned());
         }
         Action::Overlay(id) => match session.overlays.iter().position(|o| o == id) {
             Some(at) => drop(session.overlays.remove(at)),

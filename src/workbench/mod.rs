@@ -25,6 +25,7 @@ pub mod panes;
 pub mod render;
 pub mod theme;
 pub mod viewport;
+pub mod views;
 pub mod window;
 pub mod worker;
 

@@ -21,6 +21,8 @@ pub struct LiveImage {
     image: Image,
     tiles: Vec<Tile>,
     versions: Vec<u64>,
+    /// Thread seconds that each tile took last; 0 if unknown.
+    seconds: Vec<f64>,
     version: u64,
     /// Passes that are in it.
     pub passes: u32,
@@ -34,6 +36,7 @@ impl LiveImage {
             image: Image::black(size),
             tiles: vec![Tile::Empty; count],
             versions: vec![0; count],
+            seconds: vec![0.0; count],
             version: 0,
             passes: 0,
         }
@@ -82,6 +85,19 @@ impl LiveImage {
                 self.versions[at] = self.version;
             }
         }
+    }
+
+    /// Notes the thread seconds of the tile at `rect`.
+    pub fn time(&mut self, rect: Rect, seconds: f64) {
+        let at = (rect.y / TILE) as usize * tile_columns(self.image.size) + (rect.x / TILE) as usize;
+        if let Some(s) = self.seconds.get_mut(at) {
+            *s = seconds;
+        }
+    }
+
+    /// Thread seconds of the tile of that number, if known.
+    pub fn seconds(&self, tile: usize) -> Option<f64> {
+        self.seconds.get(tile).copied().filter(|s| *s > 0.0)
     }
 
     /// Number of the last change.

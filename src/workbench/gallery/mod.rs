@@ -3,6 +3,7 @@
 pub mod image;
 pub mod shade;
 pub mod texture;
+pub mod values;
 
 use crate::export::session::Panel;
 use crate::render::film::{Image, Rect};
@@ -10,6 +11,7 @@ use crate::workbench::worker::messages::{Job, TileImage};
 use image::LiveImage;
 use std::collections::BTreeMap;
 use texture::PanelTexture;
+use values::Values;
 
 /// All images, by what they show.
 #[derive(Default)]
@@ -19,6 +21,8 @@ pub struct Gallery {
     rendered: BTreeMap<String, LiveImage>,
     /// By path.
     files: BTreeMap<String, LiveImage>,
+    /// Numbers of panels that show a heatmap or a difference.
+    pub values: BTreeMap<usize, Values>,
     /// One for each panel.
     pub textures: Vec<PanelTexture>,
 }
@@ -42,6 +46,9 @@ impl Gallery {
             let image = self.estimators.get(tile.estimator).and_then(|name| self.rendered.get_mut(name));
             if let Some(image) = image {
                 image.put(rect, &tile.pixels);
+                if tile.seconds.total() > 0.0 {
+                    image.time(rect, tile.seconds.total());
+                }
             }
         }
     }

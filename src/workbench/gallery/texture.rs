@@ -78,6 +78,22 @@ impl PanelTexture {
         false
     }
 
+    /// Shows one colour for each pixel of an image that is all there; drawn again if `key` differs from last time.
+    pub fn show(&mut self, context: &egui::Context, size: [u32; 2], key: u64, color: impl Fn(usize) -> Color32) {
+        if self.size == size && self.key == key && self.handle.is_some() {
+            return;
+        }
+        let [w, h] = size.map(|n| n as usize);
+        let image = ColorImage::new([w, h], (0..w * h).map(color).collect());
+        match &mut self.handle {
+            Some(handle) => handle.set(image, OPTIONS),
+            None => self.handle = Some(context.load_texture("panel", image, OPTIONS)),
+        }
+        self.size = size;
+        self.key = key;
+        self.shown.clear();
+    }
+
     /// The texture, once there is one.
     pub fn id(&self) -> Option<egui::TextureId> {
         self.handle.as_ref().map(TextureHandle::id)

@@ -1,5 +1,7 @@
 //! Drawings on top of the images, each with its key and legend.
 
+pub mod photons;
+
 use egui::Key;
 
 /// An overlay on offer.

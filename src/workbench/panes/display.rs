@@ -1,7 +1,8 @@
 //! Exposure, tone curve, false colour and comparison, the same for all panels.
 
 use super::Panes;
-use super::widgets::{real, row, rows};
+use super::widgets::{choice, name, real, row, rows};
+use crate::export::false_color::ColorMap;
 use crate::export::session::{Curve, Difference, Mode};
 use egui::Ui;
 
@@ -36,6 +37,31 @@ pub(super) fn show(panes: &mut Panes, ui: &mut Ui) {
             }
         });
         ui.end_row();
+    });
+    rows(ui, "false colour", |ui| {
+        let names: Vec<&str> = std::iter::once("none").chain(ColorMap::ALL.map(ColorMap::name)).collect();
+        let mut shown = session.tone.false_color.clone().unwrap_or_else(|| "none".into());
+        let tip = "luminance by a scale of colours (M); heatmaps and differences take the same scale";
+        if choice(ui, "False colour", tip, &mut shown, &names) {
+            session.tone.false_color = (shown != "none").then_some(shown);
+        }
+        if !session.tone.auto {
+            let mut range = session.tone.range.unwrap_or([0.0, libm::exp2f(-session.tone.exposure)]);
+            let mut changed = false;
+            ui.label("Range").on_hover_text("values at the ends of the colour bar");
+            ui.horizontal(|ui| {
+                for (value, end) in range.iter_mut().zip(["low", "high"]) {
+                    let speed = f64::from(value.abs().max(1e-3)) * 0.01;
+                    let response = ui.add(egui::DragValue::new(value).speed(speed));
+                    name(&response, &format!("Range {end}"));
+                    changed |= response.changed();
+                }
+            });
+            ui.end_row();
+            if changed {
+                session.tone.range = Some(range);
+            }
+        }
     });
     ui.separator();
     let names: Vec<String> = session.panels.iter().map(super::image::title).collect();

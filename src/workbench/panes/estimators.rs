@@ -4,8 +4,10 @@ use super::Panes;
 use super::widgets::{choice, integer, name, rows};
 use crate::estimate::registry::{self, ESTIMATORS};
 use crate::estimate::settings::Spec;
+use crate::render::heatmap::Heatmap;
 use crate::workbench::actions::Action;
 use crate::workbench::theme;
+use crate::workbench::views::heatmap_of;
 use egui::Ui;
 
 pub(super) fn show(panes: &mut Panes, ui: &mut Ui) {
@@ -31,6 +33,14 @@ pub(super) fn show(panes: &mut Panes, ui: &mut Ui) {
             if let Some(changed) = edit(ui, &panel.estimator) {
                 panel.estimator = changed;
             }
+            rows(ui, "shows", |ui| {
+                let titles: Vec<&str> = std::iter::once("radiance").chain(Heatmap::ALL.map(Heatmap::title)).collect();
+                let mut shown = heatmap_of(panel).map_or("radiance", Heatmap::title).to_owned();
+                let tip = "the image, or a heatmap of how the estimator made it in the first pass";
+                if choice(ui, "Shows", tip, &mut shown, &titles) {
+                    panel.heatmap = Heatmap::ALL.iter().find(|h| h.title() == shown).map(|h| h.id().to_owned());
+                }
+            });
         });
         ui.separator();
     }

@@ -1,16 +1,16 @@
 //! An image panel: one estimator's image, linked with all the others.
 
-use super::Panes;
+use super::{Panes, overlay};
 use crate::export::session::{Curve, Mode, Panel, Tone};
 use crate::export::tone::SrgbTable;
 use crate::workbench::actions::Action;
 use crate::workbench::desk::Hover;
 use crate::workbench::gallery::image::{LiveImage, Tile};
-use crate::workbench::gallery::shade::Shade;
-use crate::workbench::theme::{self, mono};
+use crate::workbench::gallery::shade::{Shade, color_map, luminance_scale};
+use crate::workbench::theme::{self, mono, number};
 use crate::workbench::viewport::Viewport;
 use egui::{Align2, Color32, FontId, Rect, Sense, Stroke, Ui, pos2, vec2};
-use std::sync::LazyLock;
+use std::sync::{Arc, LazyLock};
 
 static SRGB: LazyLock<SrgbTable> = LazyLock::new(SrgbTable::new);
 
@@ -144,6 +144,9 @@ fn draw(panes: &mut Panes, ui: &mut Ui, index: usize, panel: &Panel, viewport: &
         painter.rect_stroke(rect, 0.0, Stroke::new(3.0, Color32::BLACK), egui::StrokeKind::Outside);
         painter.rect_stroke(rect, 0.0, Stroke::new(1.0, color), egui::StrokeKind::Outside);
     }
+    color_bar(panes, &painter, index, viewport);
+    overlay::draw(panes, &painter, index, viewport);
+    let session = &panes.document.session;
     if let Some([x, y, w, h]) = session.crop {
         let min = viewport.to_screen(x as f32, y as f32);
         let max = viewport.to_screen((x + w) as f32, (y + h) as f32);
@@ -156,6 +159,50 @@ fn draw(panes: &mut Panes, ui: &mut Ui, index: usize, panel: &Panel, viewport: &
     }
 }
 
+/// The bar that says which colour is which value, where colours stand for values.
+fn color_bar(panes: &Panes, painter: &egui::Painter, index: usize, viewport: &Viewport) {
+    let tone = &panes.document.session.tone;
+    let exposure = if tone.auto { panes.desk.auto_exposure } else { tone.exposure };
+    let (scale, title, unit) = match panes.gallery.values.get(&index) {
+        Some(v) => {
+            let range = tone.range.filter(|_| !tone.auto);
+            (v.scale(color_map(tone.false_color.as_deref()), range), v.title, v.unit)
+        }
+        None => match luminance_scale(tone, exposure) {
+            Some(scale) => (scale, "luminance", "W/(m² sr)"),
+            None => return,
+        },
+    };
+    let width = (viewport.panel.width() - 24.0).clamp(40.0, 220.0);
+    let frame = Rect::from_min_size(viewport.panel.left_bottom() + vec2(8.0, -44.0), vec2(width + 8.0, 38.0));
+    painter.rect_filled(frame, 2.0, Color32::from_black_alpha(170));
+    let bar = Rect::from_min_size(frame.min + vec2(4.0, 16.0), vec2(width, 8.0));
+    let range = scale.range();
+    let mut mesh = egui::Mesh::default();
+    for i in 0..=64u32 {
+        let t = i as f32 / 64.0;
+        let [r, g, b] = scale.color(range.low * (1.0 - t) + range.high * t);
+        let x = bar.left() + t * bar.width();
+        mesh.colored_vertex(pos2(x, bar.top()), Color32::from_rgb(r, g, b));
+        mesh.colored_vertex(pos2(x, bar.bottom()), Color32::from_rgb(r, g, b));
+        if i > 0 {
+            mesh.add_triangle(2 * i - 2, 2 * i - 1, 2 * i);
+            mesh.add_triangle(2 * i - 1, 2 * i, 2 * i + 1);
+        }
+    }
+    painter.add(egui::Shape::mesh(mesh));
+    let text = |at, align, text: String| {
+        painter.text(at, align, text, FontId::monospace(10.0), Color32::from_gray(230));
+    };
+    text(
+        frame.min + vec2(4.0, 2.0),
+        Align2::LEFT_TOP,
+        if unit.is_empty() { title.into() } else { format!("{title}, {unit}") },
+    );
+    text(bar.left_bottom() + vec2(0.0, 1.0), Align2::LEFT_TOP, number(f64::from(range.low)));
+    text(bar.right_bottom() + vec2(0.0, 1.0), Align2::RIGHT_TOP, number(f64::from(range.high)));
+}
+
 fn update_texture(panes: &mut Panes, context: &egui::Context, index: usize, panel: &Panel) {
     if panes.gallery.textures.len() <= index {
         panes.gallery.textures.resize_with(index + 1, Default::default);
@@ -163,10 +210,19 @@ fn update_texture(panes: &mut Panes, context: &egui::Context, index: usize, pane
     let late = panes.is_late();
     let tone = &panes.document.session.tone;
     let exposure = if tone.auto { panes.desk.auto_exposure } else { tone.exposure };
-    let shade = Shade::new(tone, exposure);
-    let key = key_of(panel, tone, exposure);
     let mut texture = std::mem::take(&mut panes.gallery.textures[index]);
-    if let Some(image) = panes.gallery.of(panel) {
+    if let Some(values) = panes.gallery.values.get(&index) {
+        let range = tone.range.filter(|_| !tone.auto);
+        let scale = values.scale(color_map(tone.false_color.as_deref()), range);
+        let made_of = Arc::as_ptr(&values.values) as usize;
+        let key = hash(&format!("{made_of} {:?} {:?}", scale.range(), tone.false_color));
+        texture.show(context, values.size, key, |i| {
+            let [r, g, b] = scale.color(values.values[i]);
+            Color32::from_rgb(r, g, b)
+        });
+    } else if let Some(image) = panes.gallery.of(panel) {
+        let shade = Shade::new(tone, exposure);
+        let key = key_of(panel, tone, exposure);
         let started = panes.started;
         let enough = || late || started.elapsed() > super::TEXTURE_TIME;
         let color = |x: u32, y: u32| shade.color(&SRGB, image.image().at(x, y));
@@ -185,7 +241,18 @@ fn key_of(panel: &Panel, tone: &Tone, exposure: f32) -> u64 {
         Curve::Linear => 2,
         Curve::Reinhard => 3,
     };
-    let text = format!("{panel:?} {} {} {curve}", exposure.to_bits(), tone.offset.to_bits());
+    let text = format!(
+        "{panel:?} {} {} {curve} {:?} {:?} {}",
+        exposure.to_bits(),
+        tone.offset.to_bits(),
+        tone.false_color,
+        tone.range,
+        tone.auto
+    );
+    hash(&text)
+}
+
+fn hash(text: &str) -> u64 {
     crate::math::hash::fnv1a(crate::math::hash::FNV_START, text.as_bytes())
 }
 

@@ -6,6 +6,7 @@ mod estimators;
 mod image;
 mod inspector;
 mod messages;
+mod overlay;
 mod overlays;
 mod photons;
 mod plan;

@@ -1,0 +1,108 @@
+//! What panels show besides radiance: asks the analysis thread for heatmaps and differences.
+
+use super::app::Workbench;
+use super::desk::{Finding, Kind};
+use super::gallery::Gallery;
+use super::gallery::values::{Origin, Values};
+use super::overlays::photons::VisiblePhotons;
+use super::render::Render;
+use crate::export::session::{Mode, Panel, Session};
+use crate::measure::Reference;
+use crate::render::film::Image;
+use crate::render::heatmap::Heatmap;
+use std::sync::Arc;
+
+/// The heatmap that a panel shows.
+pub fn heatmap_of(panel: &Panel) -> Option<Heatmap> {
+    panel.heatmap.as_deref().and_then(Heatmap::parse).filter(|_| panel.image.is_none())
+}
+
+/// Whether panel `index` shows a difference; not the panel that others are compared with.
+pub fn shows_difference(session: &Session, index: usize) -> bool {
+    session.comparison.mode == Mode::Difference && session.comparison.with != Some(index)
+}
+
+/// What the panels are compared with, and the number of its last change.
+pub fn other_side<'a>(
+    session: &Session,
+    gallery: &'a Gallery,
+    reference: Option<&'a Reference>,
+) -> Option<(&'a Image, u64)> {
+    match session.comparison.with {
+        Some(i) => session.panels.get(i).and_then(|p| gallery.of(p)).map(|l| (l.image(), l.version())),
+        None => reference.map(|r| (&r.image, 0)),
+    }
+}
+
+impl Workbench {
+    /// Asks for the photons of the overlay: those of the first pass, which stay as they are while the render goes on.
+    pub(super) fn ask_photons(&mut self) {
+        let on = self.document.session.overlays.iter().any(|o| o == "photons");
+        let Some(pass) = self.render.first_pass.clone().filter(|_| on) else { return };
+        let address = Arc::as_ptr(&pass) as usize;
+        if self.desk.photons_of != Some(address) {
+            self.desk.photons_of = Some(address);
+            self.analysis.ask(Kind::Photons, move || Finding::Photons(VisiblePhotons::of(&pass)));
+        }
+    }
+
+    /// Asks for the numbers of panels that show numbers and have none of what is shown now.
+    pub(super) fn ask_values(&mut self) {
+        let session = &self.document.session;
+        let count = session.panels.len();
+        self.gallery.values.retain(|panel, _| *panel < count);
+        self.desk.asked_values.retain(|panel, _| *panel < count);
+        for (index, panel) in session.panels.iter().enumerate() {
+            let wanted = match heatmap_of(panel) {
+                Some(kind) => heatmap_work(&self.render, panel, kind),
+                None if shows_difference(session, index) => {
+                    let stops = if session.tone.auto { self.desk.auto_exposure } else { session.tone.exposure };
+                    let reference = self.desk.reference.as_deref();
+                    difference_work(session, &self.gallery, reference, panel, stops, self.render.passes_seen)
+                }
+                None => {
+                    self.gallery.values.remove(&index);
+                    self.desk.asked_values.remove(&index);
+                    continue;
+                }
+            };
+            let Some((origin, work)) = wanted else { continue };
+            if self.desk.asked_values.get(&index) != Some(&origin) {
+                self.desk.asked_values.insert(index, origin);
+                self.analysis.ask(Kind::Values(index), move || Finding::Values(index, work()));
+            }
+        }
+    }
+}
+
+type Work = (Origin, Box<dyn FnOnce() -> Result<Values, String> + Send>);
+
+fn heatmap_work(render: &Render, panel: &Panel, kind: Heatmap) -> Option<Work> {
+    let pass = Arc::clone(render.first_pass.as_ref()?);
+    let name = panel.estimator.clone();
+    let origin = Origin::Heatmap(kind, name.clone(), Arc::as_ptr(&pass) as usize);
+    let made = origin.clone();
+    Some((origin, Box::new(move || Values::heatmap(&pass, &name, kind, made))))
+}
+
+/// A difference of whole passes: made again when a pass is done, not with every tile.
+fn difference_work(
+    session: &Session,
+    gallery: &Gallery,
+    reference: Option<&Reference>,
+    panel: &Panel,
+    stops: f32,
+    passes_seen: u64,
+) -> Option<Work> {
+    let live = gallery.of(panel)?;
+    let (other, other_version) = other_side(session, gallery, reference)?;
+    let kind = session.comparison.difference;
+    // Before the first pass is done every tile counts; the stops count for FLIP alone.
+    let version = if passes_seen == 0 { live.version() } else { passes_seen << 32 };
+    let with = session.comparison.with.map_or(other_version, |i| (i as u64 + 1) << 48);
+    let is_flip = kind == crate::measure::difference::Difference::Flip;
+    let bits = if is_flip { stops.to_bits() } else { 0 };
+    let origin = Origin::Difference(kind, version, with, bits);
+    let (image, other, made) = (live.image().clone(), other.clone(), origin.clone());
+    Some((origin, Box::new(move || Values::difference(&image, &other, kind, stops, made))))
+}
