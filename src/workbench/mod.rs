@@ -2,4 +2,5 @@
 //!
 //! It draws and asks; it holds no rendering code.
 
+pub mod painter;
 pub mod worker;
