@@ -21,6 +21,7 @@ pub mod inspector;
 pub mod layout;
 pub mod messages;
 pub mod overlays;
+pub mod painter;
 pub mod panes;
 pub mod render;
 pub mod theme;
