@@ -63,7 +63,7 @@ fn path(pass: &Pass, found: &Inspection, n: u32) -> String {
             v.parent.map_or("camera".into(), |p| p.to_string()),
             v.cell.to_string(),
             v.surface.name().into(),
-            v.material.to_string(),
+            pass.scene.material_names.get(v.material as usize).cloned().unwrap_or_default(),
             place(pass, v.position),
             color(v.throughput),
             format!("{} x {}", number(v.footprint[0].length()), number(v.footprint[1].length())),

@@ -23,7 +23,7 @@ pub use light::Light;
 pub use material::Material;
 pub use source::{Source, open};
 
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 use scene_file::RenderFile;
 use std::sync::Arc;
 
@@ -36,9 +36,7 @@ pub struct Scene {
     pub hash: u64,
     /// Where the local origin lies in the file's own coordinates, metres.
     pub origin: DVec3,
-    /// Centre of the bounding box of all surfaces, in local coordinates, metres.
-    pub center: Vec3,
-    /// Radius of the sphere about `center` that holds all surfaces, metres; positive.
+    /// Radius of the sphere about the local origin that holds all surfaces, metres; positive.
     pub radius: f32,
     /// The camera.
     pub camera: Camera,
@@ -46,6 +44,8 @@ pub struct Scene {
     pub geometry: Arc<Geometry>,
     /// Materials, indexed by [`Geometry`].
     pub materials: Vec<Material>,
+    /// Name of each material as the file has it.
+    pub material_names: Vec<String>,
     /// Light sources.
     pub lights: Vec<Light>,
     /// The `[render]` table as it was written.

@@ -348,7 +348,7 @@ impl Workbench {
             }
             Action::DismissMessages => self.messages.clear(),
             Action::CopyReadout => {
-                if let Some(text) = bars::readout(&self.document, &self.gallery, &self.desk) {
+                if let Some(text) = bars::readout(&self.document, &self.gallery, &self.render, &self.desk) {
                     context.copy_text(text);
                     self.messages.note("copied the readout");
                 }

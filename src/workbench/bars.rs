@@ -144,7 +144,7 @@ pub fn status(
 ) {
     Panel::bottom("status").show(ui, |ui| {
         ui.horizontal(|ui| {
-            match readout(document, gallery, desk) {
+            match readout(document, gallery, render, desk) {
                 Some(text) => ui.label(mono(text)),
                 None if render.progress.is_none() && messages.all().is_empty() => {
                     ui.weak("Hover a pixel, click to pin it, hold B to compare; Ctrl+P lists every action.")
@@ -173,10 +173,24 @@ pub fn gravity_color(gravity: Gravity) -> Color32 {
     }
 }
 
+/// The surface that a pixel sees first: its material, and where it lies in the scene's own coordinates.
+fn place(render: &Render, pixel: [u32; 2]) -> Option<String> {
+    let pass = render.pass.as_ref()?;
+    let seen = crate::render::inspect::inspect(pass, &[], pixel).ok()?;
+    let Some(first) = seen.path.first() else { return Some("nothing".into()) };
+    let at = first.position.as_dvec3() + pass.scene.origin;
+    let [x, y, z] = at.to_array().map(number);
+    let name = pass.scene.material_names.get(first.material as usize).map_or("", String::as_str);
+    Some(format!("{} {name} at {x} {y} {z} m", first.surface.name()))
+}
+
 /// The values of all panels under the pointer, or at the pin without one.
-pub fn readout(document: &Document, gallery: &Gallery, desk: &Desk) -> Option<String> {
+pub fn readout(document: &Document, gallery: &Gallery, render: &Render, desk: &Desk) -> Option<String> {
     let pixel = desk.hover.map(|h| h.pixel).or_else(|| document.session.pins.last().copied())?;
     let mut text = format!("{}, {}", pixel[0], pixel[1]);
+    if let Some(place) = place(render, pixel) {
+        let _ = write!(text, "  {place}");
+    }
     for (i, panel) in document.session.panels.iter().enumerate() {
         let Some(value) = gallery.of(panel).and_then(|i| i.at(pixel)) else { continue };
         let number_of = gallery.values.get(&i).and_then(|v| Some((v.at(pixel)?, v)));

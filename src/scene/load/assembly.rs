@@ -71,6 +71,7 @@ pub(super) enum LightSource {
 pub(super) struct Assembly {
     pub(super) mesh: Mesh,
     pub(super) materials: Vec<Material>,
+    pub(super) material_names: Vec<String>,
     pub(super) spheres: Vec<(DVec3, f64, u32)>,
     pub(super) lights: Vec<LightSource>,
 }
@@ -88,8 +89,9 @@ impl Assembly {
         self.mesh.materials.extend(mesh.materials.iter().map(|&m| material(m)));
     }
 
-    pub(super) fn add_material(&mut self, material: Material) -> u32 {
+    pub(super) fn add_material(&mut self, name: impl Into<String>, material: Material) -> u32 {
         self.materials.push(material);
+        self.material_names.push(name.into());
         self.materials.len() as u32 - 1
     }
 

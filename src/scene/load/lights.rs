@@ -99,16 +99,17 @@ impl Loader<'_> {
     /// Gives a light with area its surface, so that the camera sees it and light that arrives ends there.
     pub(super) fn light_surface(&mut self, light: &LightSource) {
         let pi2 = std::f64::consts::PI.powi(2);
+        let name = format!("light {}", self.assembly.lights.len() + 1);
         match light {
             LightSource::Sphere { center, radius, power } => {
                 let radiance = (power.as_dvec3() / (4.0 * pi2 * radius * radius)).as_vec3();
-                let m = self.assembly.add_material(Material::Emitter { radiance });
+                let m = self.assembly.add_material(name, Material::Emitter { radiance });
                 self.assembly.spheres.push((*center, *radius, m));
             }
             LightSource::Quad { center, u, v, power } => {
                 let area = 4.0 * u.cross(*v).length();
                 let radiance = (power.as_dvec3() / (std::f64::consts::PI * area)).as_vec3();
-                let m = self.assembly.add_material(Material::Emitter { radiance });
+                let m = self.assembly.add_material(name, Material::Emitter { radiance });
                 self.assembly.add_mesh(shapes::quad(*center, *u, *v), |_| m);
             }
             _ => {}

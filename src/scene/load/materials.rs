@@ -14,7 +14,7 @@ impl Loader<'_> {
     pub(super) fn materials(&mut self, materials: &BTreeMap<String, MaterialFile>) -> Checked<()> {
         for (name, file) in materials {
             let material = self.material(&format!("materials.{name}"), file)?;
-            let index = self.assembly.add_material(material);
+            let index = self.assembly.add_material(name, material);
             self.material_index.insert(name.clone(), index);
         }
         Ok(())

@@ -11,7 +11,7 @@ use crate::scene::scene_file::{AnimateFile, CameraFile, LightFile, RenderFile, S
 use crate::scene::source::{Files, hash_of};
 use crate::scene::{Camera, Light, Scene, SceneError};
 use assembly::{Assembly, CameraSource, LightSource, local_geometry};
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -273,12 +273,12 @@ impl<'a> Loader<'a> {
             name,
             hash: hash_of(&texts),
             origin,
-            center: Vec3::ZERO,
             radius: radius as f32,
             camera: camera.local(origin),
             lights: lights.collect(),
             geometry: geometry.into(),
             materials: self.assembly.materials,
+            material_names: self.assembly.material_names,
             render,
             render_lines: self.locator.lines_of("render"),
             warnings: self.warnings,

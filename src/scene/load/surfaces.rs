@@ -193,12 +193,13 @@ impl Loader<'_> {
                 }
                 other => other,
             })?;
-            own.push(self.assembly.add_material(made));
+            own.push(self.assembly.add_material(material, made));
         }
         let mut fallback = NONE;
         if mesh.materials.contains(&NONE) {
             self.warnings.push(format!("{}: surfaces without a material are grey", path.display()));
-            fallback = self.assembly.add_material(Material::Diffuse { reflectance: Rgb::splat(0.8), texture: None });
+            fallback =
+                self.assembly.add_material("none", Material::Diffuse { reflectance: Rgb::splat(0.8), texture: None });
         }
         self.assembly.add_mesh(mesh, |m| own.get(m as usize).copied().unwrap_or(fallback));
         // Each emissive material of the mesh is a light of its triangles; they come in runs.

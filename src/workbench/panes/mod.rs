@@ -60,7 +60,8 @@ impl Behavior<Pane> for Panes<'_> {
         if let Pane::Image(panel) = pane {
             return if image::show(self, ui, *panel) { UiResponse::DragStarted } else { UiResponse::None };
         }
-        egui::Frame::new().fill(ui.visuals().panel_fill).inner_margin(6).show(ui, |ui| {
+        ui.painter().rect_filled(ui.available_rect_before_wrap(), 0.0, ui.visuals().panel_fill);
+        egui::Frame::new().inner_margin(6).show(ui, |ui| {
             let scroll = egui::ScrollArea::vertical().auto_shrink(false);
             match pane {
                 Pane::ErrorPlot => plots::errors(self, ui),

@@ -22,6 +22,17 @@ fn plot(name: &str) -> Plot<'static> {
     Plot::new(name.to_owned()).allow_scroll(false).allow_boxed_zoom(false).show_grid(true)
 }
 
+fn legend(corner: Corner) -> Legend {
+    Legend::default().position(corner).text_style(egui::TextStyle::Small).background_alpha(0.5)
+}
+
+/// An estimator without its settings, if no other panel has the same.
+fn short<'a>(names: &[&'a str], name: &'a str) -> &'a str {
+    let id = |n: &'a str| n.split(':').next().unwrap_or(n);
+    let alike = names.iter().filter(|n| **n != name && id(n) == id(name)).count();
+    if alike == 0 { id(name) } else { name }
+}
+
 /// log10 of a positive number; anything else has no place in a plot.
 fn log10(x: f64) -> Option<f64> {
     (x > 0.0 && x.is_finite()).then(|| libm::log10(x))
@@ -54,7 +65,7 @@ pub(super) fn errors(panes: &mut Panes, ui: &mut Ui) {
         .y_axis_formatter(power_of_ten)
         .label_formatter(format)
         .x_axis_label("s")
-        .legend(Legend::default().position(Corner::RightTop))
+        .legend(legend(Corner::RightTop))
         .show(ui, |plot| {
             for (i, name) in names.iter().enumerate() {
                 if names[..i].contains(name) {
@@ -64,8 +75,9 @@ pub(super) fn errors(panes: &mut Panes, ui: &mut Ui) {
                 let points: Vec<[f64; 2]> =
                     curve.iter().filter_map(|p| Some([log10(p.seconds)?, log10(p.error.relative_rmse)?])).collect();
                 let color = theme::panel_color(&names, i);
-                plot.line(Line::new(*name, PlotPoints::from(points.clone())).color(color).width(1.5));
-                plot.points(Points::new(*name, PlotPoints::from(points)).color(color).radius(2.0));
+                let title = short(&names, name);
+                plot.line(Line::new(title, PlotPoints::from(points.clone())).color(color).width(1.5));
+                plot.points(Points::new(title, PlotPoints::from(points)).color(color).radius(2.0));
             }
         });
 }
@@ -89,19 +101,22 @@ pub(super) fn times(panes: &mut Panes, ui: &mut Ui) {
         let traced = progress.seconds.photon_trace;
         let both = (traced + progress.seconds.map_build).max(f64::MIN_POSITIVE);
         let parts = [shared * traced / both, shared * (1.0 - traced / both), own.view_trace, own.gather, own.estimate];
-        for (stack, part) in stacks.iter_mut().zip(parts) {
-            stack.push(Bar::new(i as f64, part / passes * 1e3).width(0.7));
+        for ((stack, part), (_, grey)) in stacks.iter_mut().zip(parts).zip(&PHASES) {
+            let shade = Color32::from_gray(*grey);
+            let bar = Bar::new(i as f64, part / passes * 1e3).width(0.7).fill(shade);
+            stack.push(bar.stroke(egui::Stroke::NONE));
         }
     }
-    let names = job.estimators.clone();
+    let names: Vec<&str> = job.estimators.iter().map(String::as_str).collect();
+    let names: Vec<String> = names.iter().map(|n| short(&names, n).to_owned()).collect();
     let count = names.len();
     plot("times")
-        .legend(Legend::default().position(Corner::RightTop))
+        .legend(legend(Corner::RightTop))
         .y_axis_label("ms")
         .x_axis_formatter(move |mark, _| {
             let i = mark.value.round();
             let is_bar = (mark.value - i).abs() < 1e-6 && i >= 0.0 && (i as usize) < count;
-            if is_bar { names[i as usize].split(':').next().unwrap_or("").to_owned() } else { String::new() }
+            if is_bar { names[i as usize].clone() } else { String::new() }
         })
         .show(ui, |plot| {
             let mut charts: Vec<BarChart> = Vec::new();
@@ -124,19 +139,15 @@ pub(super) fn areas(panes: &mut Panes, ui: &mut Ui) {
         ui.weak("No photon is stored.");
         return;
     }
-    plot("areas")
-        .x_axis_formatter(power_of_ten)
-        .x_axis_label("m²")
-        .legend(Legend::default().position(Corner::RightTop))
-        .show(ui, |plot| {
-            for (name, bins) in &histogram.kinds {
-                let color = match *name {
-                    "caustic" => Color32::from_rgb(240, 200, 120),
-                    "global" => Color32::from_rgb(120, 170, 220),
-                    _ => Color32::from_gray(170),
-                };
-                let bars = bins.iter().map(|(x, n)| Bar::new(*x, *n as f64).width(super::super::areas::BIN)).collect();
-                plot.bar_chart(BarChart::new(*name, bars).color(color.gamma_multiply(0.7)));
-            }
-        });
+    plot("areas").x_axis_formatter(power_of_ten).x_axis_label("m²").legend(legend(Corner::RightTop)).show(ui, |plot| {
+        for (name, bins) in &histogram.kinds {
+            let color = match *name {
+                "caustic" => Color32::from_rgb(240, 200, 120),
+                "global" => Color32::from_rgb(120, 170, 220),
+                _ => Color32::from_gray(170),
+            };
+            let bars = bins.iter().map(|(x, n)| Bar::new(*x, *n as f64).width(super::super::areas::BIN)).collect();
+            plot.bar_chart(BarChart::new(*name, bars).color(color.gamma_multiply(0.7)));
+        }
+    });
 }
