@@ -28,6 +28,9 @@ fn next_area(area: f64, pass: u32) -> f64 {
     area * (f64::from(pass) + ALPHA) / (f64::from(pass) + 1.0)
 }
 
+/// Pixels across and down that one pixel of a draft stands for.
+pub const DRAFT_SCALE: u32 = 4;
+
 /// How a step ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Step {
@@ -223,11 +226,13 @@ impl Renderer {
         Step::Done
     }
 
-    /// Shows what the next pass may look like, with few photons and no pilot, and keeps nothing of it.
+    /// Shows what the next pass may look like, with few photons, few pixels and no pilot, and keeps nothing of it.
     ///
-    /// `photons` are emitted in place of the settings' number; their footprints are larger by as much.
+    /// `photons` are emitted in place of the settings' number; their footprints are larger by as much. Each pixel
+    /// stands for [`DRAFT_SCALE`] of them across and down.
     pub fn draft(&self, photons: u64, watch: &dyn Watch) -> Step {
-        let settings = RenderSettings { photons, plan: PlanMode::Full, ..self.settings.clone() };
+        let size = self.settings.size.map(|n| n.div_ceil(DRAFT_SCALE));
+        let settings = RenderSettings { photons, size, plan: PlanMode::Full, ..self.settings.clone() };
         let plan = Plan::new(&self.scene, &settings, &slots(&self.estimators, settings.gather), None);
         let number = self.passes();
         let now: Vec<usize> = (0..self.films.len()).filter(|&i| self.films[i].passes() == number).collect();
@@ -295,7 +300,7 @@ impl Renderer {
         let chosen: Vec<Slot> = now.iter().map(|&i| all[i]).collect();
         let films: Vec<&Film> = now.iter().map(|&i| &self.films[i]).collect();
         let watch = FilmWatch { watch, estimators: now, films: &films, draft };
-        let result = pass.view().run(Rect::whole(self.settings.size), &chosen, &watch);
+        let result = pass.view().run(Rect::whole(pass.settings.size), &chosen, &watch);
         result.complete.then_some(result)
     }
 
@@ -449,6 +454,39 @@ pub fn slots(estimators: &[Box<dyn Estimator>], gather: Gather) -> Vec<Slot<'_>>
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::render::watch::TileDone;
+    use crate::scene::open;
+    use crate::scene::scene_file::RenderFile;
+    use std::sync::Mutex;
+
+    /// Counts how often each pixel comes in.
+    struct Coverage(Mutex<Vec<u32>>, u32);
+
+    impl Watch for Coverage {
+        fn tile_done(&self, tile: &TileDone) {
+            let r = tile.rect();
+            for (_, pixels, _) in tile.means() {
+                assert_eq!(pixels.len(), (r.width * r.height) as usize);
+                let mut seen = self.0.lock().expect("not poisoned");
+                for i in 0..r.width * r.height {
+                    seen[((r.y + i / r.width) * self.1 + r.x + i % r.width) as usize] += 1;
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_draft_covers_the_film_and_leaves_it_alone() {
+        let scene = open("ring").expect("built in");
+        let flags = RenderFile { photons: Some(30_000), ..Default::default() };
+        let settings = RenderSettings::new(&scene, &flags, Some([150, 131]), 1).expect("valid");
+        let estimators = crate::estimate::registry::estimators("regular,integrated").expect("registered");
+        let renderer = Renderer::unplanned(scene.into(), settings, estimators);
+        let coverage = Coverage(Mutex::new(vec![0; 150 * 131]), 150);
+        assert_eq!(renderer.draft(2000, &coverage), Step::Done);
+        assert!(coverage.0.lock().expect("not poisoned").iter().all(|n| *n == 2));
+        assert!(renderer.films().iter().all(|f| f.passes() == 0));
+    }
 
     #[test]
     fn footprints_shrink_as_the_passes_to_the_minus_one_third() {

@@ -3,6 +3,7 @@
 use crate::math::rgb::Rgb;
 use crate::render::film::{Film, Rect};
 use crate::render::pass::Pass;
+use crate::render::renderer::DRAFT_SCALE;
 use crate::render::view_pass::{PartSeconds, TileResult, TileWatch};
 use std::sync::Arc;
 
@@ -51,19 +52,36 @@ pub struct TileDone<'a> {
 }
 
 impl TileDone<'_> {
-    /// Where it lies.
+    /// Where it lies in the film. The tiles of a draft have few pixels and cover many.
     pub fn rect(&self) -> Rect {
-        self.tile.rect
+        let Rect { x, y, width, height } = self.tile.rect;
+        if !self.draft {
+            return self.tile.rect;
+        }
+        let [w, h] = self.films.first().map_or([0, 0], |f| f.size());
+        let (left, top) = (x * DRAFT_SCALE, y * DRAFT_SCALE);
+        let width = (width * DRAFT_SCALE).min(w.saturating_sub(left));
+        let height = (height * DRAFT_SCALE).min(h.saturating_sub(top));
+        Rect { x: left, y: top, width, height }
     }
 
-    /// For each image: index of its estimator, the mean of all passes with this one, and thread seconds.
+    /// For each image: index of its estimator, the mean of all passes with this one over [`TileDone::rect`], and thread
+    /// seconds. Of a draft, its pixels alone, each as often as it has to be.
     ///
     /// The same bits as the film's image will have when the pass is finished.
     pub fn means(&self) -> impl Iterator<Item = (usize, Vec<Rgb>, PartSeconds)> {
-        self.tile.images.iter().zip(self.estimators).zip(self.films).map(|((image, &estimator), film)| {
-            let pixels = if self.draft { image.pixels.clone() } else { film.mean_with(self.rect(), &image.pixels) };
+        let rect = self.rect();
+        self.tile.images.iter().zip(self.estimators).zip(self.films).map(move |((image, &estimator), film)| {
+            let pixels = if self.draft { self.enlarged(&image.pixels) } else { film.mean_with(rect, &image.pixels) };
             (estimator, pixels, image.seconds)
         })
+    }
+
+    /// The pixels of a draft over what they cover.
+    fn enlarged(&self, pixels: &[Rgb]) -> Vec<Rgb> {
+        let (rect, columns) = (self.rect(), self.tile.rect.width);
+        let at = |x: u32, y: u32| pixels[(y / DRAFT_SCALE * columns + x / DRAFT_SCALE) as usize];
+        (0..rect.height).flat_map(|y| (0..rect.width).map(move |x| at(x, y))).collect()
     }
 }
 

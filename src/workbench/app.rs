@@ -29,8 +29,8 @@ pub struct Workbench {
     pub(super) analysis: Analysis<Kind, Finding>,
     pub(super) tree: Tree<Pane>,
     context: egui::Context,
-    /// Passes whose errors have been asked for.
-    measured: u64,
+    /// Passes and drafts whose images have been measured.
+    measured: (u64, u64),
     styled: bool,
 }
 
@@ -60,7 +60,7 @@ impl Workbench {
             tree,
             document,
             context: context.clone(),
-            measured: 0,
+            measured: (0, 0),
             styled: false,
         };
         workbench.new_scene();
@@ -123,9 +123,14 @@ impl Workbench {
                 Err(why) => self.messages.error(why),
             }
         }
-        if self.render.passes_seen != self.measured {
-            self.measured = self.render.passes_seen;
-            self.after_pass();
+        let seen = (self.render.passes_seen, self.render.drafts_seen);
+        if seen != self.measured {
+            let pass_done = seen.0 != self.measured.0;
+            self.measured = seen;
+            self.expose();
+            if pass_done {
+                self.after_pass();
+            }
         }
     }
 
@@ -220,8 +225,8 @@ impl Workbench {
         self.analysis.ask(Kind::Open, move || Finding::Opened(Box::new(Opened::new(session)), step));
     }
 
-    /// Exposure, and errors against the reference.
-    fn after_pass(&mut self) {
+    /// Exposure by the last panel that has an image.
+    fn expose(&mut self) {
         let panels = &self.document.session.panels;
         let shown = panels.iter().rev().filter_map(|p| self.gallery.of(p)).find(|i| i.has_pixels());
         if let Some(image) = shown {
@@ -231,6 +236,10 @@ impl Workbench {
                 self.desk.auto_exposure = exposure;
             }
         }
+    }
+
+    /// Footprint areas, and errors against the reference.
+    fn after_pass(&mut self) {
         if let Some(pass) = self.render.pass.clone() {
             self.analysis.ask(Kind::Areas, move || Finding::Areas(Areas::of(&pass)));
         }

@@ -175,7 +175,7 @@ pub fn gravity_color(gravity: Gravity) -> Color32 {
 
 /// The surface that a pixel sees first: its material, and where it lies in the scene's own coordinates.
 fn place(render: &Render, pixel: [u32; 2]) -> Option<String> {
-    let pass = render.pass.as_ref()?;
+    let pass = render.current_pass()?;
     let seen = crate::render::inspect::inspect(pass, &[], pixel).ok()?;
     let Some(first) = seen.path.first() else { return Some("nothing".into()) };
     let at = first.position.as_dvec3() + pass.scene.origin;

@@ -17,7 +17,7 @@ pub struct Render {
     wake: Wake,
     job: Option<Job>,
     generation: u64,
-    /// The pass whose tiles come in, or came last.
+    /// The pass whose tiles come in, or came last; drafts apart.
     pub pass: Option<Arc<Pass>>,
     /// The first pass of the job that is rendered, kept for who looks into it.
     pub first_pass: Option<Arc<Pass>>,
@@ -30,6 +30,8 @@ pub struct Render {
     pub finished: bool,
     /// Counts up with every finished pass.
     pub passes_seen: u64,
+    /// Counts up with every finished draft.
+    pub drafts_seen: u64,
     started: Instant,
     first_tile: Option<Duration>,
 }
@@ -49,6 +51,7 @@ impl Render {
             progress: None,
             finished: false,
             passes_seen: 0,
+            drafts_seen: 0,
             started: Instant::now(),
             first_tile: None,
         }
@@ -102,12 +105,16 @@ impl Render {
                     if !draft && std::mem::take(&mut self.first_is_old) {
                         self.first_pass = Some(Arc::clone(&pass));
                     }
-                    (self.pass, self.draft) = (Some(pass), draft);
+                    self.draft = draft;
+                    if !draft {
+                        self.pass = Some(pass);
+                    }
                 }
                 Event::TileDone { rect, images, .. } => {
                     self.first_tile.get_or_insert_with(|| self.started.elapsed());
                     gallery.tile(rect, &images);
                 }
+                Event::DraftDone { .. } => self.drafts_seen += 1,
                 Event::PassDone { progress, .. } => {
                     gallery.passes(&progress.passes);
                     messages.set_warnings(&progress.warnings);
@@ -145,6 +152,12 @@ impl Render {
     /// Time from the last change to its first tile.
     pub fn first_tile(&self) -> Option<Duration> {
         self.first_tile
+    }
+
+    /// The pass whose tiles come in or came last, if it is of the scene and size that are rendered now.
+    pub fn current_pass(&self) -> Option<&Arc<Pass>> {
+        let job = self.job.as_ref()?;
+        self.pass.as_ref().filter(|p| Arc::ptr_eq(&p.scene, &job.scene) && p.settings.size == job.settings.size)
     }
 
     /// The job that is rendered.

@@ -77,7 +77,7 @@ pub(super) fn draw(panes: &Panes, painter: &Painter, index: usize, viewport: &Vi
 /// The view footprint of the pixel under the pointer; dashed where it is seen by way of a specular surface.
 fn footprint(projection: &Projection, painter: &Painter) {
     let panes = projection.panes;
-    let (Some(hover), Some(pass)) = (panes.desk.hover_before, &panes.render.pass) else { return };
+    let (Some(hover), Some(pass)) = (panes.desk.hover_before, panes.render.current_pass()) else { return };
     let Ok(seen) = inspect(pass, &[], hover.pixel) else { return };
     for vertex in &seen.path {
         let Some(outline) = projection.all(&corners(vertex.position, vertex.footprint)) else { continue };

@@ -54,6 +54,11 @@ pub enum Event {
         /// Whether it is not kept.
         draft: bool,
     },
+    /// All tiles of a draft have come.
+    DraftDone {
+        /// Generation of the job.
+        generation: u64,
+    },
     /// A pass is in the films.
     PassDone {
         /// Generation of the job.
@@ -110,6 +115,7 @@ impl Event {
         match self {
             Self::PassStarted { generation, .. }
             | Self::TileDone { generation, .. }
+            | Self::DraftDone { generation }
             | Self::PassDone { generation, .. }
             | Self::Finished { generation } => Some(*generation),
             Self::Failed { .. } => None,

@@ -84,12 +84,12 @@ impl Loop<'_> {
         if renderer.films().iter().any(|f| f.passes() > 0) {
             desk.send(Event::PassDone { generation: job.generation, progress: Box::new(progress(renderer)) });
         }
-        if job.settings.photons > DRAFT_PHOTONS
-            && renderer.passes() == 0
-            && !renderer.has_next_photons()
-            && renderer.draft(DRAFT_PHOTONS, &desk) == Step::Cancelled
-        {
-            return;
+        let wants_draft = job.settings.photons > DRAFT_PHOTONS && renderer.passes() == 0;
+        if wants_draft && !renderer.films().is_empty() {
+            if renderer.draft(DRAFT_PHOTONS, &desk) == Step::Cancelled {
+                return;
+            }
+            desk.send(Event::DraftDone { generation: job.generation });
         }
         while !self.gate.is_stale(job.generation) && renderer.passes() < job.passes && !renderer.films().is_empty() {
             if renderer.step(&desk) == Step::Cancelled {
