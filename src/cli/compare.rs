@@ -3,7 +3,7 @@
 use crate::cli::compare_table::text;
 use crate::cli::failure::Failure;
 use crate::cli::flags::{CommonFlags, check_crop, rect};
-use crate::cli::progress::{ProgressWatch, bar, interrupted, listen_for_interrupts};
+use crate::cli::progress::{Collector, ProgressWatch, bar, interrupted, listen_for_interrupts};
 use crate::cli::table::percent;
 use crate::cli::window::session;
 use crate::cli::{print, to_json};
@@ -185,10 +185,11 @@ impl<'a> Comparison<'a> {
         let hidden = self.args.flags.quiet || self.args.flags.json;
         let steps = tiles(Rect::whole(self.renderer.settings().size)).len() as u64;
         let progress = bar(steps, "estimators", hidden);
-        let step = self.renderer.step(&ProgressWatch { bar: &progress });
+        let collector = Collector::new(self.renderer.settings().size, self.renderer.estimators().len(), &progress);
+        let step = self.renderer.step(&collector);
         progress.finish_and_clear();
         if step == Step::Cancelled {
-            return Err(Failure::Interrupted("nothing was written".into()));
+            return Err(self.write_part(collector, steps));
         }
         let images: Vec<Image> = self.renderer.films().iter().map(|f| f.image()).collect();
         let crop = self.crop.unwrap_or_else(|| self.default_crop(&images));
@@ -196,9 +197,7 @@ impl<'a> Comparison<'a> {
         let plan_cost = if interrupted() { None } else { self.plan_cost() };
         let names = file_names(self.renderer.estimators());
         let report = self.report(&images, crop, truth.as_ref(), plan_cost, &names);
-        let folder = self.args.flags.out.clone().unwrap_or_else(|| {
-            Path::new("cusp-out").join(format!("compare-{}", file_stem(&self.renderer.scene().name)))
-        });
+        let folder = self.folder();
         self.write(&folder, &images, crop, truth.as_ref(), &report, &names)?;
         if self.args.flags.json {
             print(&to_json(&report)?)?;
@@ -212,6 +211,29 @@ impl<'a> Comparison<'a> {
             return Err(Failure::Interrupted(format!("what was done is in {}", folder.display())));
         }
         Ok(())
+    }
+
+    /// Writes the tiles that were done before an interruption, and says so.
+    fn write_part(&self, collector: Collector, steps: u64) -> Failure {
+        let (images, done) = collector.into_images();
+        if done == 0 {
+            return Failure::Interrupted("nothing was written".into());
+        }
+        let folder = self.folder();
+        let provenance = Provenance::new(self.renderer.scene(), self.renderer.settings().seed);
+        for (name, image) in file_names(self.renderer.estimators()).iter().zip(&images) {
+            if let Err(why) = exr_file::write(&folder.join(format!("{name}.exr")), image, &provenance) {
+                return why.into();
+            }
+        }
+        Failure::Interrupted(format!("{done} of {steps} tiles of each image are in {}", folder.display()))
+    }
+
+    /// Where files go.
+    fn folder(&self) -> PathBuf {
+        self.args.flags.out.clone().unwrap_or_else(|| {
+            Path::new("cusp-out").join(format!("compare-{}", file_stem(&self.renderer.scene().name)))
+        })
     }
 
     /// Where the estimators that use footprints and the same view rays disagree most; where the image changes most if

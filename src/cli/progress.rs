@@ -1,9 +1,11 @@
 //! Progress on standard error, and the interruption by Ctrl-C.
 
+use crate::render::film::Image;
 use crate::render::view_pass::{TileResult, TileWatch};
 use crate::render::watch::{TileDone, Watch};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, PoisonError};
 
 static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 
@@ -47,6 +49,42 @@ impl Watch for ProgressWatch<'_> {
     }
 
     fn tile_done(&self, _tile: &TileDone) {
+        self.bar.inc(1);
+    }
+}
+
+/// As [`ProgressWatch`], and keeps the tiles for the case that the pass is not finished.
+pub struct Collector<'a> {
+    bar: &'a ProgressBar,
+    /// One image for each estimator, and how many tiles are in them.
+    done: Mutex<(Vec<Image>, u64)>,
+}
+
+impl<'a> Collector<'a> {
+    /// For so many images of `size` pixels.
+    pub fn new(size: [u32; 2], images: usize, bar: &'a ProgressBar) -> Self {
+        Self { bar, done: Mutex::new((vec![Image::black(size); images], 0)) }
+    }
+
+    /// The images, black where no tile was done, and the number of tiles.
+    pub fn into_images(self) -> (Vec<Image>, u64) {
+        // Tiles are copied whole, so what a panicking thread left is of use too.
+        self.done.into_inner().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Watch for Collector<'_> {
+    fn cancelled(&self) -> bool {
+        interrupted()
+    }
+
+    fn tile_done(&self, tile: &TileDone) {
+        let rect = tile.rect();
+        let mut done = self.done.lock().unwrap_or_else(PoisonError::into_inner);
+        for (estimator, pixels, _) in tile.means() {
+            done.0[estimator].put(rect, &pixels);
+        }
+        done.1 += 1;
         self.bar.inc(1);
     }
 }

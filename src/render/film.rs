@@ -103,6 +103,14 @@ impl Image {
         self.pixels[y as usize * self.size[0] as usize + x as usize]
     }
 
+    /// Overwrites the pixels of `rect`, which must lie inside, row by row.
+    pub fn put(&mut self, rect: Rect, pixels: &[Rgb]) {
+        for (row, line) in pixels.chunks(rect.width.max(1) as usize).enumerate() {
+            let start = (rect.y as usize + row) * self.size[0] as usize + rect.x as usize;
+            self.pixels[start..start + line.len()].copy_from_slice(line);
+        }
+    }
+
     /// The part inside `rect`, which must lie inside the image.
     pub fn crop(&self, rect: Rect) -> Self {
         let pixels = (rect.y..rect.y + rect.height)

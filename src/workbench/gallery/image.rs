@@ -71,11 +71,7 @@ impl LiveImage {
 
     /// Overwrites the pixels of `rect`, which lies inside and covers whole tiles.
     pub fn put(&mut self, rect: Rect, pixels: &[Rgb]) {
-        let width = self.image.size[0] as usize;
-        for (row, line) in pixels.chunks(rect.width.max(1) as usize).enumerate() {
-            let start = (rect.y as usize + row) * width + rect.x as usize;
-            self.image.pixels[start..start + line.len()].copy_from_slice(line);
-        }
+        self.image.put(rect, pixels);
         self.version += 1;
         let columns = tile_columns(self.image.size);
         for y in rect.y / TILE..(rect.y + rect.height).div_ceil(TILE) {
