@@ -120,7 +120,7 @@ fn progress(render: &Render) -> String {
             }
         }
     } else {
-        text.push_str(if render.draft { "draft" } else { "pass 0" });
+        let _ = write!(text, "{} {:2.0} %", if render.draft { "draft" } else { "pass 1:" }, 100.0 * render.part());
     }
     if !render.is_alive() {
         text.push_str("   stopped");

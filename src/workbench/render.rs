@@ -30,6 +30,8 @@ pub struct Render {
     pub finished: bool,
     /// Counts up with every finished pass.
     pub passes_seen: u64,
+    /// Tiles of the pass that have come.
+    pub tiles: usize,
     /// Counts up with every finished draft.
     pub drafts_seen: u64,
     started: Instant,
@@ -51,6 +53,7 @@ impl Render {
             progress: None,
             finished: false,
             passes_seen: 0,
+            tiles: 0,
             drafts_seen: 0,
             started: Instant::now(),
             first_tile: None,
@@ -102,6 +105,7 @@ impl Render {
             self.generation,
             |event| match event {
                 Event::PassStarted { pass, draft, .. } => {
+                    self.tiles = 0;
                     if !draft && std::mem::take(&mut self.first_is_old) {
                         self.first_pass = Some(Arc::clone(&pass));
                     }
@@ -112,6 +116,7 @@ impl Render {
                 }
                 Event::TileDone { rect, images, .. } => {
                     self.first_tile.get_or_insert_with(|| self.started.elapsed());
+                    self.tiles += 1;
                     gallery.tile(rect, &images);
                 }
                 Event::DraftDone { .. } => self.drafts_seen += 1,
@@ -158,6 +163,18 @@ impl Render {
     pub fn current_pass(&self) -> Option<&Arc<Pass>> {
         let job = self.job.as_ref()?;
         self.pass.as_ref().filter(|p| Arc::ptr_eq(&p.scene, &job.scene) && p.settings.size == job.settings.size)
+    }
+
+    /// Part of the running pass that is done, in `[0, 1]`.
+    pub fn part(&self) -> f32 {
+        let Some(job) = &self.job else { return 0.0 };
+        let size = if self.draft {
+            job.settings.size.map(|n| n.div_ceil(crate::render::renderer::DRAFT_SCALE))
+        } else {
+            job.settings.size
+        };
+        let all = size.map(|n| n.div_ceil(crate::render::tiles::TILE) as usize);
+        (self.tiles as f32 / (all[0] * all[1]).max(1) as f32).min(1.0)
     }
 
     /// The job that is rendered.

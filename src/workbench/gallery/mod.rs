@@ -5,6 +5,7 @@ pub mod shade;
 pub mod texture;
 pub mod values;
 
+use crate::export::false_color::ValueRange;
 use crate::export::session::Panel;
 use crate::render::film::{Image, Rect};
 use crate::workbench::worker::messages::{Job, TileImage};
@@ -70,6 +71,13 @@ impl Gallery {
     /// Whether that file's image is here.
     pub fn has_file(&self, path: &str) -> bool {
         self.files.contains_key(path)
+    }
+
+    /// Range of the colours of a panel's numbers: that of all panels that show the same, so that they can be compared.
+    pub fn range_of(&self, panel: usize) -> Option<ValueRange> {
+        let own = self.values.get(&panel)?;
+        let alike = self.values.values().filter(|v| v.title == own.title);
+        Some(alike.fold(own.range, |r, v| ValueRange { low: r.low.min(v.range.low), high: r.high.max(v.range.high) }))
     }
 
     /// The image of a panel.

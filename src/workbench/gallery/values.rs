@@ -84,9 +84,8 @@ impl Values {
         Self { origin, size, values: Arc::new(values), range, unit, title, signed }
     }
 
-    /// The scale of colours: `map` for values of one sign, the diverging one for others; `range` in place of their own.
-    pub fn scale(&self, map: ColorMap, range: Option<[f32; 2]>) -> FalseColor {
-        let range = range.map_or(self.range, |[low, high]| ValueRange { low, high });
+    /// The scale of colours over a range: `map` for values of one sign, the diverging one for others.
+    pub fn scale(&self, map: ColorMap, range: ValueRange) -> FalseColor {
         FalseColor::new(if self.signed { ColorMap::Diverging } else { map }, range)
     }
 

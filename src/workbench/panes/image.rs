@@ -1,6 +1,7 @@
 //! An image panel: one estimator's image, linked with all the others.
 
 use super::{Panes, overlay};
+use crate::export::false_color::ValueRange;
 use crate::export::session::{Curve, Mode, Panel, Tone};
 use crate::export::tone::SrgbTable;
 use crate::workbench::actions::Action;
@@ -144,8 +145,9 @@ fn draw(panes: &mut Panes, ui: &mut Ui, index: usize, panel: &Panel, viewport: &
         painter.rect_stroke(rect, 0.0, Stroke::new(3.0, Color32::BLACK), egui::StrokeKind::Outside);
         painter.rect_stroke(rect, 0.0, Stroke::new(1.0, color), egui::StrokeKind::Outside);
     }
+    let inside = painter.with_clip_rect(viewport.panel.intersect(viewport.image()));
+    overlay::draw(panes, &inside, index, viewport);
     color_bar(panes, &painter, index, viewport);
-    overlay::draw(panes, &painter, index, viewport);
     let session = &panes.document.session;
     if let Some([x, y, w, h]) = session.crop {
         let min = viewport.to_screen(x as f32, y as f32);
@@ -159,15 +161,21 @@ fn draw(panes: &mut Panes, ui: &mut Ui, index: usize, panel: &Panel, viewport: &
     }
 }
 
+/// Range of the colours of a panel's numbers: as locked, or that of all panels that show the same.
+fn values_range(panes: &Panes, index: usize) -> ValueRange {
+    let tone = &panes.document.session.tone;
+    match tone.range.filter(|_| !tone.auto) {
+        Some([low, high]) => ValueRange { low, high },
+        None => panes.gallery.range_of(index).unwrap_or(ValueRange::up_to(1.0)),
+    }
+}
+
 /// The bar that says which colour is which value, where colours stand for values.
 fn color_bar(panes: &Panes, painter: &egui::Painter, index: usize, viewport: &Viewport) {
     let tone = &panes.document.session.tone;
     let exposure = if tone.auto { panes.desk.auto_exposure } else { tone.exposure };
     let (scale, title, unit) = match panes.gallery.values.get(&index) {
-        Some(v) => {
-            let range = tone.range.filter(|_| !tone.auto);
-            (v.scale(color_map(tone.false_color.as_deref()), range), v.title, v.unit)
-        }
+        Some(v) => (v.scale(color_map(tone.false_color.as_deref()), values_range(panes, index)), v.title, v.unit),
         None => match luminance_scale(tone, exposure) {
             Some(scale) => (scale, "luminance", "W/(m² sr)"),
             None => return,
@@ -212,8 +220,7 @@ fn update_texture(panes: &mut Panes, context: &egui::Context, index: usize, pane
     let exposure = if tone.auto { panes.desk.auto_exposure } else { tone.exposure };
     let mut texture = std::mem::take(&mut panes.gallery.textures[index]);
     if let Some(values) = panes.gallery.values.get(&index) {
-        let range = tone.range.filter(|_| !tone.auto);
-        let scale = values.scale(color_map(tone.false_color.as_deref()), range);
+        let scale = values.scale(color_map(tone.false_color.as_deref()), values_range(panes, index));
         let made_of = Arc::as_ptr(&values.values) as usize;
         let key = hash(&format!("{made_of} {:?} {:?}", scale.range(), tone.false_color));
         texture.show(context, values.size, key, |i| {

@@ -16,7 +16,7 @@ const PINK: Color32 = Color32::from_rgb(230, 120, 200);
 /// Sides of an ellipse in an image.
 const SIDES: usize = 24;
 /// Ellipses in a panel at most; more would hide each other.
-const ELLIPSES: usize = 350;
+const ELLIPSES: usize = 250;
 /// Tiles need this many points to carry their time.
 const LABELLED: f32 = 44.0;
 
