@@ -6,7 +6,13 @@ use std::path::Path;
 use std::process::{Command, Output};
 
 fn cusp(args: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_cusp")).args(args).output().expect("the binary runs")
+    // Without a display, so that no test opens a window.
+    Command::new(env!("CARGO_BIN_EXE_cusp"))
+        .args(args)
+        .env_remove("DISPLAY")
+        .env_remove("WAYLAND_DISPLAY")
+        .output()
+        .expect("the binary runs")
 }
 
 fn text(bytes: &[u8]) -> String {
@@ -305,12 +311,12 @@ fn lists_are_readable_by_people_and_programs() {
 }
 
 #[test]
-fn without_a_command_the_ring_is_compared() {
+fn without_a_display_the_ring_is_compared() {
     let folder = tempfile::tempdir().expect("a folder");
     let o = path(folder.path());
     let out = cusp(&["--out", o, "--size", "64x64", "--photons", "1e4"]);
     assert!(out.status.success(), "{}", text(&out.stderr));
-    assert!(text(&out.stderr).contains("no window yet"));
+    assert!(text(&out.stderr).contains("There is no window (no display"));
     assert!(text(&out.stdout).starts_with("ring: 64x64"));
 }
 
@@ -326,11 +332,39 @@ fn an_interrupted_render_writes_what_is_done() {
         .stderr(std::process::Stdio::piped())
         .spawn()
         .expect("the binary runs");
+    let out = interrupt(child);
+    assert!(text(&out.stderr).contains("passes were written"), "{}", text(&out.stderr));
+    assert!(image::open(&exr).is_ok());
+}
+
+/// Ctrl-C in the one pass of a comparison leaves an image of each estimator with the tiles that were done.
+#[cfg(unix)]
+#[test]
+fn an_interrupted_comparison_writes_its_tiles() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let o = folder.path().join("part");
+    let child = Command::new(env!("CARGO_BIN_EXE_cusp"))
+        .args(["compare", "cornell", "--size", "4096x4096", "--photons", "1000", "--estimators", "regular,integrated"])
+        .args(["--out", path(&o)])
+        .stdout(std::process::Stdio::piped())
+        .stderr(std::process::Stdio::piped())
+        .spawn()
+        .expect("the binary runs");
+    let out = interrupt(child);
+    assert!(text(&out.stderr).contains("of 16384 tiles of each image are in"), "{}", text(&out.stderr));
+    for name in ["regular.exr", "integrated.exr"] {
+        assert!(image::open(o.join(name)).is_ok(), "{name}");
+    }
+    assert!(!o.join("report.json").exists());
+}
+
+/// Sends Ctrl-C after two seconds, which no run of these tests ends within, and waits for exit code 130.
+#[cfg(unix)]
+fn interrupt(child: std::process::Child) -> Output {
     std::thread::sleep(std::time::Duration::from_secs(2));
     let killed = Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("kill runs");
     assert!(killed.success());
     let out = child.wait_with_output().expect("ends");
     assert_eq!(out.status.code(), Some(130), "{}", text(&out.stderr));
-    assert!(text(&out.stderr).contains("passes were written"), "{}", text(&out.stderr));
-    assert!(image::open(&exr).is_ok());
+    out
 }

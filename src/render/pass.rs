@@ -5,6 +5,7 @@ use crate::render::photon_pass::{Emitter, PhotonMaps, PhotonPass};
 use crate::render::plan::{Pilot, Plan};
 use crate::render::renderer::{area_factor, slots};
 use crate::render::settings::RenderSettings;
+use crate::render::tiles::TILE;
 use crate::render::view::ViewTracer;
 use crate::render::view_pass::ViewPass;
 use crate::scene::Scene;
@@ -83,6 +84,7 @@ impl Pass {
             maps: &self.maps,
             pass: self.number,
             area_factor: self.area_factor as f32,
+            tile: TILE,
         }
     }
 

@@ -8,7 +8,8 @@ use crate::render::photon_pass::{Emitter, PhotonMaps, PhotonPass};
 use crate::render::plan::{Pilot, Plan, Slot};
 use crate::render::settings::{Gather, PlanMode, RenderSettings};
 use crate::render::stats::{Bounded, Seconds, StoredCounts};
-use crate::render::view_pass::{PartSeconds, ViewResult};
+use crate::render::tiles::TILE;
+use crate::render::view_pass::{PartSeconds, ViewPass, ViewResult};
 use crate::render::watch::{FilmWatch, Watch};
 use crate::scene::Scene;
 use crate::trace::Intersector;
@@ -300,7 +301,10 @@ impl Renderer {
         let chosen: Vec<Slot> = now.iter().map(|&i| all[i]).collect();
         let films: Vec<&Film> = now.iter().map(|&i| &self.films[i]).collect();
         let watch = FilmWatch { watch, estimators: now, films: &films, draft };
-        let result = pass.view().run(Rect::whole(pass.settings.size), &chosen, &watch);
+        // The tiles of a draft cover those of a pass, so that its first ones come soon.
+        let tile = if draft { TILE / DRAFT_SCALE } else { TILE };
+        let view = ViewPass { tile, ..pass.view() };
+        let result = view.run(Rect::whole(pass.settings.size), &chosen, &watch);
         result.complete.then_some(result)
     }
 

@@ -7,14 +7,19 @@ pub const TILE: u32 = 32;
 
 /// The tiles that cover `region`, row by row.
 pub fn tiles(region: Rect) -> Vec<Rect> {
+    tiles_of(region, TILE)
+}
+
+/// Tiles of `side` pixels that cover `region`, row by row.
+pub fn tiles_of(region: Rect, side: u32) -> Vec<Rect> {
     let mut all = Vec::new();
-    for y in (0..region.height).step_by(TILE as usize) {
-        for x in (0..region.width).step_by(TILE as usize) {
+    for y in (0..region.height).step_by(side as usize) {
+        for x in (0..region.width).step_by(side as usize) {
             all.push(Rect {
                 x: region.x + x,
                 y: region.y + y,
-                width: TILE.min(region.width - x),
-                height: TILE.min(region.height - y),
+                width: side.min(region.width - x),
+                height: side.min(region.height - y),
             });
         }
     }

@@ -10,7 +10,7 @@ use crate::render::film::Rect;
 use crate::render::photon_pass::PhotonMaps;
 use crate::render::plan::Slot;
 use crate::render::settings::Gather;
-use crate::render::tiles::tiles;
+use crate::render::tiles::tiles_of;
 use crate::render::view::{
     Branch, Unrecorded, ViewCounts, ViewHit, ViewRecorder, ViewTracer, at_point, sample_position,
 };
@@ -75,6 +75,8 @@ pub struct ViewPass<'a> {
     pub pass: u32,
     /// Area of footprints relative to the first pass.
     pub area_factor: f32,
+    /// Pixels along a tile's side, at least 1. It decides no pixel.
+    pub tile: u32,
 }
 
 /// The result of a view pass over a region.
@@ -128,7 +130,7 @@ impl ViewPass<'_> {
     /// Renders `region` for every slot; `watch` is asked and told from the threads that make the tiles.
     pub fn run(&self, region: Rect, slots: &[Slot], watch: &dyn TileWatch) -> ViewResult {
         let start = Instant::now();
-        let all = tiles(region);
+        let all = tiles_of(region, self.tile);
         let results: Vec<Option<TileResult>> = all
             .par_iter()
             .enumerate()

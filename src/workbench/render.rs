@@ -168,12 +168,7 @@ impl Render {
     /// Part of the running pass that is done, in `[0, 1]`.
     pub fn part(&self) -> f32 {
         let Some(job) = &self.job else { return 0.0 };
-        let size = if self.draft {
-            job.settings.size.map(|n| n.div_ceil(crate::render::renderer::DRAFT_SCALE))
-        } else {
-            job.settings.size
-        };
-        let all = size.map(|n| n.div_ceil(crate::render::tiles::TILE) as usize);
+        let all = job.settings.size.map(|n| n.div_ceil(crate::render::tiles::TILE) as usize);
         (self.tiles as f32 / (all[0] * all[1]).max(1) as f32).min(1.0)
     }
 
