@@ -72,9 +72,9 @@ impl Coplanar {
         Ok(Box::new(Self::new(shape, weight)))
     }
 
-    /// The part of the view footprint that the photon's shape covers along the view ray; None if it is far off.
+    /// Centre and half-edges of the view footprint in the photon's footprint, along the view ray; None if it is far off.
     #[inline]
-    fn clipped(&self, photon: &MapPhoton, view: &View) -> Option<ClippedPolygon> {
+    fn projected(photon: &MapPhoton, view: &View) -> Option<[DVec2; 3]> {
         let v = view.direction;
         let across = photon.normal.dot(v);
         if across.abs() < 1e-6 {
@@ -92,17 +92,17 @@ impl Coplanar {
         if pc.x.abs() - reach.x >= 1.0 || pc.y.abs() - reach.y >= 1.0 {
             return None;
         }
+        Some([pc, pa, pb])
+    }
+
+    fn over_area(&self, photon: &MapPhoton, view: &View) -> f64 {
+        let Some([pc, pa, pb]) = Self::projected(photon, view) else {
+            return 0.0;
+        };
         let mut polygon = ClippedPolygon::whole(pc, pa, pb);
         for plane in &self.planes {
             polygon.clip(plane);
         }
-        Some(polygon)
-    }
-
-    fn over_area(&self, photon: &MapPhoton, view: &View) -> f64 {
-        let Some(polygon) = self.clipped(photon, view) else {
-            return 0.0;
-        };
         let (coverage, centroid) = polygon.coverage_and_centroid();
         if coverage <= 0.0 {
             return 0.0;
@@ -166,9 +166,13 @@ impl Estimator for Coplanar {
 
     /// The covered part, and as its only point the centroid at which `weight=centroid` evaluates the kernel.
     fn construction(&self, photon: &MapPhoton, view: &View) -> Construction {
-        let Some(polygon) = self.clipped(photon, view) else {
+        let Some([pc, pa, pb]) = Self::projected(photon, view) else {
             return Construction::default();
         };
+        let mut polygon = ClippedPolygon::whole(pc, pa, pb);
+        for plane in &self.planes {
+            polygon.clip(plane);
+        }
         let (coverage, centroid) = polygon.coverage_and_centroid();
         let [a, b] = view.query.axes;
         let at = |p: DVec2| view.query.center + a * p.x as f32 + b * p.y as f32;

@@ -70,9 +70,11 @@ pub struct ViewMeeting<'a> {
 /// Hears what view paths meet. A path's two branches come one after the other: first a surface, then all behind it.
 pub trait ViewRecorder {
     /// The ray of a cell of a pixel sets out. Cells are counted row by row.
+    #[inline]
     fn ray(&mut self, _cell: u32) {}
 
     /// It meets a surface.
+    #[inline]
     fn meets(&mut self, _meeting: &ViewMeeting) {}
 }
 
@@ -130,16 +132,16 @@ impl ViewTracer<'_> {
                 branch.throughput *= inside;
             }
             let material = &self.scene.materials[surface.material as usize];
-            let (throughput, depth, footprint) = (branch.throughput, branch.depth, branch.differential.dp);
-            let (mut light, hits_before) = (Rgb::ZERO, hits.len());
+            let (mut light, mut made_hit) = (Rgb::ZERO, false);
             match material {
                 Material::Emitter { radiance: emitted } => {
                     if surface.front && self.plan.emission {
-                        light = throughput * *emitted;
+                        light = branch.throughput * *emitted;
+                        radiance += light;
                     }
                 }
                 Material::Diffuse { .. } => {
-                    let weight = throughput * material.diffuse_reflectance(surface.uv) * FRAC_1_PI;
+                    let weight = branch.throughput * material.diffuse_reflectance(surface.uv) * FRAC_1_PI;
                     if self.plan.shadow_rays {
                         let receiver = Receiver { position: surface.position, normal: surface.normal };
                         light = weight
@@ -151,16 +153,22 @@ impl ViewTracer<'_> {
                                 sequence,
                                 index,
                             );
+                        radiance += light;
                     }
                     if self.plan.needs_photons() && weight != Rgb::ZERO {
                         hits.push(ViewHit {
                             view: View {
-                                query: Query { center: surface.position, normal: surface.normal, axes: footprint },
+                                query: Query {
+                                    center: surface.position,
+                                    normal: surface.normal,
+                                    axes: branch.differential.dp,
+                                },
                                 direction: v,
                             },
                             weight,
                             pixel,
                         });
+                        made_hit = true;
                     }
                 }
                 _ => {
@@ -170,16 +178,15 @@ impl ViewTracer<'_> {
                     self.scatter(material, &surface, branch, sequence, index, stack, counts);
                 }
             }
-            radiance += light;
             recorder.meets(&ViewMeeting {
                 surface: &surface,
                 direction: v,
                 distance: hit.t,
-                footprint,
-                throughput,
-                depth,
+                footprint: branch.differential.dp,
+                throughput: branch.throughput,
+                depth: branch.depth,
                 light,
-                hit: (hits.len() > hits_before).then_some(hits_before),
+                hit: made_hit.then(|| hits.len() - 1),
             });
         }
         radiance
