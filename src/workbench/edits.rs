@@ -63,17 +63,20 @@ pub fn apply(action: &Action, session: &mut Session, desk: &mut Desk, gallery: &
         }
         Action::Pin(pixel) => pin(session, *pixel),
         Action::Nudge(step) => nudge(session, *step, gallery),
-        Action::Unpin => {
-            if desk.crop_drag.take().is_none() && !desk.dialogs.close() {
-                session.pins.clear();
-            }
-        }
+        Action::Unpin => escape(session, desk),
         Action::SelectCrop => desk.crop_drag = Some(None),
         Action::ClearCrop => session.crop = None,
         Action::GoToPixel => desk.dialogs.open(Dialog::GoTo(String::new())),
         Action::Palette => desk.dialogs.open(Dialog::Palette(String::new())),
         Action::Shortcuts => desk.dialogs.open(Dialog::Shortcuts),
         _ => {}
+    }
+}
+
+/// Ends the crop that is dragged, or else closes the dialog, or else removes the pins.
+fn escape(session: &mut Session, desk: &mut Desk) {
+    if desk.crop_drag.take().is_none() && !desk.dialogs.close() {
+        session.pins.clear();
     }
 }
 
@@ -105,7 +108,7 @@ mod tests {
     #[test]
     fn pins_move_inside_the_image() {
         let (mut session, mut desk, mut gallery) = (Session::of("ring"), Desk::default(), Gallery::default());
-        gallery.put_file("a", Image::black([10, 5]));
+        gallery.put_file("a", &Image::black([10, 5]));
         session.panels = vec![Panel { image: Some("a".into()), ..Panel::of("") }];
         let mut run = |action: Action| {
             apply(&action, &mut session, &mut desk, &gallery);

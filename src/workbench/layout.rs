@@ -197,7 +197,9 @@ mod tests {
         let tree = standard(3);
         let again = from_text(&to_text(&tree).expect("a text")).expect("a tree");
         assert_eq!(images(&again), [0, 1, 2]);
-        assert_eq!(to_text(&again), to_text(&tree));
+        // Its maps have no order.
+        let value = |t| serde_json::to_value(t).expect("a value");
+        assert_eq!(value(&again), value(&tree));
         assert!(from_text("{}").is_none());
     }
 }

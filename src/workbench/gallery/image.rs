@@ -43,7 +43,7 @@ impl LiveImage {
     }
 
     /// An image that is all there.
-    pub fn whole(image: Image) -> Self {
+    pub fn whole(image: &Image) -> Self {
         let mut live = Self::new(image.size);
         let size = image.size;
         live.put(Rect::whole(size), &image.pixels);

@@ -64,7 +64,7 @@ impl Gallery {
     }
 
     /// Takes in an image from a file.
-    pub fn put_file(&mut self, path: &str, image: Image) {
+    pub fn put_file(&mut self, path: &str, image: &Image) {
         self.files.insert(path.to_owned(), LiveImage::whole(image));
     }
 
