@@ -168,6 +168,8 @@ impl Workbench {
             Finding::Inspected(Ok(found)) => self.desk.inspector.take(*found),
             Finding::Inspected(Err(why)) => self.messages.error(why),
             Finding::Path(path) => self.desk.inspector.path = path,
+            Finding::Exported(Ok(what)) => self.messages.note(what),
+            Finding::Exported(Err(why)) => self.messages.error(why),
             Finding::Errors(generation, errors) => {
                 if self.render.job().is_some_and(|j| j.generation == generation) {
                     for (estimator, point) in errors {

@@ -31,6 +31,8 @@ pub enum Kind {
     Inspect,
     /// A photon's path.
     Path,
+    /// Write what is shown.
+    Export,
 }
 
 /// What the analysis thread has found.
@@ -53,6 +55,8 @@ pub enum Finding {
     Inspected(Result<Box<Inspected>, String>),
     /// The path of a photon.
     Path(Option<FoundPath>),
+    /// What was exported, or why not.
+    Exported(Result<String, String>),
 }
 
 /// How a scene that was opened comes into the history.

@@ -107,9 +107,4 @@ impl Workbench {
     pub(super) fn export(&mut self) {
         self.desk.dialogs.ask_path(Purpose::Export, "cusp-out/window");
     }
-
-    /// Exports to a folder.
-    pub(super) fn export_to(&mut self, folder: &Path) {
-        self.messages.note(format!("export to {} is not there yet", folder.display()));
-    }
 }

@@ -14,6 +14,7 @@ pub mod desk;
 pub mod dialogs;
 pub mod document;
 pub mod edits;
+mod exporting;
 pub mod files;
 pub mod gallery;
 pub mod history;
