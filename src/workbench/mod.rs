@@ -24,10 +24,12 @@ pub mod messages;
 pub mod overlays;
 pub mod painter;
 pub mod panes;
+pub mod recent;
 pub mod render;
 pub mod theme;
 pub mod viewport;
 pub mod views;
+pub mod watch;
 pub mod window;
 pub mod worker;
 
