@@ -68,7 +68,7 @@ fn session() -> Session {
 }
 
 fn read(path: &Path) -> Image {
-    Reference::from_files(path, None).unwrap_or_else(|e| panic!("{}: {e}", path.display())).image
+    Reference::from_files(path, None).expect("an image").image
 }
 
 fn bits(image: &Image) -> Vec<[u32; 3]> {
@@ -99,6 +99,12 @@ fn files_hold_what_the_window_shows() {
     exr_file::write_with(&reference, &grey, &[]).expect("writes");
     let mut session = session();
     session.reference = Some(reference.to_string_lossy().into_owned());
+    // An image of another size, which the crop meets in part.
+    let other = folder.path().join("other.exr");
+    let pixels = (0..30 * 40).map(|i| glam::Vec3::new(i as f32, 0.5, 1.0) / 1200.0).collect();
+    let loaded = Image { size: [30, 40], pixels };
+    exr_file::write_with(&other, &loaded, &[]).expect("writes");
+    session.panels.push(Panel { image: Some(other.to_string_lossy().into_owned()), ..Panel::of("") });
     session.tone.offset = 0.05;
     let context = egui::Context::default();
     let mut workbench = finished(&context, session);
@@ -147,8 +153,11 @@ fn files_hold_what_the_window_shows() {
             }
         }
     }
+    assert_eq!(bits(&read(&out.join("image-other.exr"))), bits(&loaded));
+    let part = Rect { x: 10, y: 20, width: 20, height: 20 };
+    assert_eq!(bits(&read(&out.join("image-other_crop.exr"))), bits(&loaded.crop(part)));
     let sheet = image::open(out.join("sheet.png")).expect("a PNG");
-    assert_eq!(sheet.width(), 12 + 2 * (CROP.width * ENLARGE + 12));
+    assert_eq!(sheet.width(), 12 + 3 * (CROP.width * ENLARGE + 12));
 
     let csv = std::fs::read_to_string(out.join("timings.csv")).expect("reads");
     let lines: Vec<Vec<String>> = csv.lines().map(fields).collect();
@@ -179,9 +188,24 @@ fn files_hold_what_the_window_shows() {
     let mut again = Session::open(&out.join("session.toml")).expect("opens");
     let layout = again.layout.take().expect("the layout is part of it");
     assert!(cusp::workbench::layout::from_text(&layout).is_some());
-    let named = again.reference.take().expect("a reference");
-    assert_eq!(std::fs::canonicalize(named).expect("is there"), std::fs::canonicalize(&reference).expect("is there"));
-    assert_eq!(again, Session { reference: None, layout: None, ..workbench.session().clone() });
+    let is = |named: Option<String>, path: &Path| {
+        let whole = |p: &Path| std::fs::canonicalize(p).expect("is there");
+        assert_eq!(whole(named.expect("a path").as_ref()), whole(path));
+    };
+    is(again.reference.take(), &reference);
+    is(again.panels[2].image.take(), &other);
+    let mut expected = Session { reference: None, layout: None, ..workbench.session().clone() };
+    expected.panels[2].image = None;
+    assert_eq!(again, expected);
+    let text = std::fs::read_to_string(out.join("session.toml")).expect("reads");
+    assert!(text.contains("\"../grey.exr\"") && text.contains("\"../other.exr\""), "{text}");
+    // The window that it reopens shows the same.
+    let mut reopened = finished(&context, Session::open(&out.join("session.toml")).expect("opens"));
+    let second = folder.path().join("second");
+    assert_eq!(export(&mut reopened, &context, &second).0, Gravity::Note);
+    for file in ["regular.exr", "integrated_crop.exr", "image-other.exr"] {
+        assert_eq!(bits(&read(&second.join(file))), bits(&read(&out.join(file))), "{file}");
+    }
 }
 
 #[test]

@@ -20,7 +20,7 @@ fn compare(session: &Path, out: &Path) -> Output {
 }
 
 fn read(path: &Path) -> Image {
-    Reference::from_files(path, None).unwrap_or_else(|e| panic!("{}: {e}", path.display())).image
+    Reference::from_files(path, None).expect("an image").image
 }
 
 fn brightness(image: &Image) -> f64 {

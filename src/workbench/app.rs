@@ -198,6 +198,7 @@ impl Workbench {
 
     /// What has to be looked at afresh when the scene is another one.
     fn new_scene(&mut self) {
+        self.read_images();
         self.desk.reference = None;
         let session = &self.document.session;
         let (scene, reference, mask) = (session.scene.clone(), session.reference.clone(), session.mask.clone());
