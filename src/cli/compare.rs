@@ -7,14 +7,14 @@ use crate::cli::progress::{Collector, ProgressWatch, bar, interrupted, listen_fo
 use crate::cli::table::percent;
 use crate::cli::window::session;
 use crate::cli::{print, to_json};
+use crate::estimate::Lookup;
 use crate::estimate::registry::{self, ESTIMATORS};
 use crate::estimate::regular::Regular;
-use crate::estimate::{Estimator, Lookup};
 use crate::export::report::{CompareReport, EstimatorReport, EstimatorSeconds, PlanCost, RenderReport};
 use crate::export::session::Session;
 use crate::export::sheet::{self, Column, PALETTE, Sheet};
-use crate::export::tone::{auto_exposure, to_srgb};
-use crate::export::{Provenance, exr_file, png_file, whole_file};
+use crate::export::tone::{Look, ToneMap, auto_exposure, to_srgb};
+use crate::export::{Provenance, exr_file, names, png_file, whole_file};
 use crate::measure::Reference;
 use crate::measure::metrics::{Mask, compare};
 use crate::measure::window::{busiest_window, contours, disagreement};
@@ -29,7 +29,6 @@ use crate::render::view_pass::ViewPass;
 use crate::render::{Plan, Renderer};
 use crate::scene::open;
 use clap::{Args, ValueEnum};
-use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
@@ -195,7 +194,7 @@ impl<'a> Comparison<'a> {
         let crop = self.crop.unwrap_or_else(|| self.default_crop(&images));
         let truth = self.truth(crop, hidden);
         let plan_cost = if interrupted() { None } else { self.plan_cost() };
-        let names = file_names(self.renderer.estimators());
+        let names = names::of_estimators(self.renderer.estimators());
         let report = self.report(&images, crop, truth.as_ref(), plan_cost, &names);
         let folder = self.folder();
         self.write(&folder, &images, crop, truth.as_ref(), &report, &names)?;
@@ -221,7 +220,7 @@ impl<'a> Comparison<'a> {
         }
         let folder = self.folder();
         let provenance = Provenance::new(self.renderer.scene(), self.renderer.settings().seed);
-        for (name, image) in file_names(self.renderer.estimators()).iter().zip(&images) {
+        for (name, image) in names::of_estimators(self.renderer.estimators()).iter().zip(&images) {
             if let Err(why) = exr_file::write(&folder.join(format!("{name}.exr")), image, &provenance) {
                 return why.into();
             }
@@ -232,7 +231,7 @@ impl<'a> Comparison<'a> {
     /// Where files go.
     fn folder(&self) -> PathBuf {
         self.args.flags.out.clone().unwrap_or_else(|| {
-            Path::new("cusp-out").join(format!("compare-{}", file_stem(&self.renderer.scene().name)))
+            Path::new("cusp-out").join(format!("compare-{}", names::file_stem(&self.renderer.scene().name)))
         })
     }
 
@@ -412,6 +411,7 @@ impl<'a> Comparison<'a> {
             ],
             color: PALETTE[i % PALETTE.len()],
             image: image.clone(),
+            look: Look::Tone(ToneMap::srgb(exposure)),
             error: truth.map(|(region, t)| {
                 // A full truth is cut to the crop.
                 let t = if *region == crop { t.clone() } else { t.crop(crop) };
@@ -437,7 +437,6 @@ impl<'a> Comparison<'a> {
             columns: columns.collect(),
             crop,
             enlarge: self.enlarge,
-            exposure,
         }
     }
 }
@@ -447,48 +446,4 @@ fn signed_error(image: &Image, truth: &Image) -> Image {
     let mean = truth.pixels.iter().map(|p| crate::math::rgb::mean(*p)).sum::<f32>() / truth.pixels.len().max(1) as f32;
     let scale = if mean > 0.0 { 1.0 / mean } else { 0.0 };
     Image { size: image.size, pixels: image.pixels.iter().zip(&truth.pixels).map(|(x, t)| (*x - *t) * scale).collect() }
-}
-
-/// File names: ids, with settings where two would be the same.
-fn file_names(estimators: &[Box<dyn Estimator>]) -> Vec<String> {
-    let mut taken = BTreeSet::new();
-    estimators
-        .iter()
-        .map(|e| {
-            let alone = estimators.iter().filter(|o| o.id() == e.id()).count() == 1;
-            let base = file_stem(&if alone { e.id().to_owned() } else { e.name() });
-            let mut name = base.clone();
-            let mut n = 2;
-            while !taken.insert(name.clone()) {
-                name = format!("{base}-{n}");
-                n += 1;
-            }
-            name
-        })
-        .collect()
-}
-
-/// Letters, digits and a few signs; anything else becomes a hyphen.
-fn file_stem(name: &str) -> String {
-    name.chars().map(|c| if c.is_ascii_alphanumeric() || "._-".contains(c) { c } else { '-' }).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn file_names_are_told_apart() {
-        let list =
-            registry::estimators("regular,multi_sampled:n=2,multi_sampled:n=4,multi_sampled:n=4").expect("parses");
-        assert_eq!(
-            file_names(&list),
-            [
-                "regular",
-                "multi_sampled-n-2-grid-closed",
-                "multi_sampled-n-4-grid-closed",
-                "multi_sampled-n-4-grid-closed-2"
-            ]
-        );
-    }
 }

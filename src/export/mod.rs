@@ -2,12 +2,15 @@
 
 pub mod exr_file;
 pub mod false_color;
+pub mod names;
+pub mod panel_files;
 pub mod png_file;
 pub mod provenance;
 pub mod report;
 pub mod session;
 pub mod sheet;
 pub mod text;
+pub mod timings;
 pub mod tone;
 pub mod whole_file;
 

@@ -12,6 +12,9 @@ use std::path::{Path, PathBuf};
 /// Version of the format, the value of the key `session`.
 pub const VERSION: u32 = 1;
 
+/// Largest factor of enlargement.
+pub const MAX_ENLARGE: u32 = 32;
+
 /// A session file (TOML). Every part but `session` and `scene` may be left out.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -38,7 +41,7 @@ pub struct Session {
     /// The part that is enlarged and exported: x, y, width, height.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub crop: Option<[u32; 4]>,
-    /// Factor of enlargement.
+    /// Factor of enlargement, 1 to [`MAX_ENLARGE`].
     #[serde(default = "three")]
     pub enlarge: u32,
     /// Pinned pixels, the inspected one last.
@@ -266,6 +269,10 @@ impl Session {
         let placed = |name: &str| folder.join(name).to_string_lossy().into_owned();
         if crate::scene::built_in::find(&session.scene).is_none() {
             session.scene = placed(&session.scene);
+            if !Path::new(&session.scene).is_file() {
+                let what = format!("no such file: {}; give a scene file or a built-in name", session.scene);
+                return Err(crate::scene::locate::Locator::new(path, &text).error("scene", what));
+            }
         }
         for file in [&mut session.reference, &mut session.mask].into_iter().flatten() {
             *file = placed(file);
@@ -283,6 +290,12 @@ impl Session {
             return Err(
                 locator.error("session", format!("is version {}; this program reads {VERSION}", session.session))
             );
+        }
+        if !(1..=MAX_ENLARGE).contains(&session.enlarge) {
+            return Err(locator.error("enlarge", format!("must lie in 1 to {MAX_ENLARGE}")));
+        }
+        if session.crop.is_some_and(|[_, _, width, height]| width == 0 || height == 0) {
+            return Err(locator.error("crop", "is x, y, width, height; width and height must be at least 1"));
         }
         for (i, panel) in session.panels.iter().enumerate() {
             if panel.image.is_none() {
@@ -336,10 +349,17 @@ impl Session {
         Ok((source, scene))
     }
 
-    /// The estimators of the panels.
+    /// The distinct estimators of the panels, in their order.
     pub fn estimators(&self) -> Vec<Box<dyn Estimator>> {
-        let rendered = self.panels.iter().filter(|p| p.image.is_none());
-        rendered.filter_map(|p| registry::estimator(&p.estimator).ok()).collect()
+        let mut all: Vec<Box<dyn Estimator>> = Vec::new();
+        for panel in self.panels.iter().filter(|p| p.image.is_none()) {
+            if let Ok(e) = registry::estimator(&panel.estimator)
+                && all.iter().all(|other| other.name() != e.name())
+            {
+                all.push(e);
+            }
+        }
+        all
     }
 
     /// The crop as a rectangle.

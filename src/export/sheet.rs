@@ -1,7 +1,7 @@
 //! The sheet: estimators side by side, each with its image, its crop and its error, labelled.
 
 use crate::export::text::{Canvas, Face};
-use crate::export::tone::to_srgb;
+use crate::export::tone::Look;
 use crate::math::rgb::luminance;
 use crate::render::film::{Image, Rect};
 
@@ -15,6 +15,8 @@ pub struct Column {
     pub color: [u8; 3],
     /// The whole image.
     pub image: Image,
+    /// How it becomes bytes.
+    pub look: Look,
     /// Signed error of the crop, relative to the truth's mean; None without a truth.
     pub error: Option<Image>,
 }
@@ -27,12 +29,10 @@ pub struct Sheet {
     pub subtitle: String,
     /// The estimators.
     pub columns: Vec<Column>,
-    /// The part that is enlarged.
+    /// The part that is enlarged, of each image what lies inside it. If it is all of them, they stand there but once.
     pub crop: Rect,
     /// Factor of enlargement.
     pub enlarge: u32,
-    /// Factor on radiance before the sRGB curve, for all images.
-    pub exposure: f32,
 }
 
 /// Neutral, so that the eye can judge what lies on it.
@@ -66,7 +66,9 @@ pub fn draw(sheet: &Sheet) -> Canvas {
     let heading = 62;
     let label = 30 + lines * LINE;
     let crops = if has_error { 2 } else { 1 };
-    let height = heading + label + shown[1] + crops * (crop_height + GAP) + 2 * GAP + LINE;
+    let overview = sheet.columns.iter().any(|c| Rect::whole(c.image.size) != sheet.crop);
+    let above = if overview { shown[1] + GAP } else { 0 };
+    let height = heading + label + above + crops * (crop_height + GAP) + GAP + LINE;
     let width = GAP + sheet.columns.len() as u32 * (inner + GAP);
     let mut canvas = Canvas::new([width, height], BACKGROUND);
     canvas.text(GAP, 8, width - 2 * GAP, 28.0, INK, Face::Proportional, &sheet.title);
@@ -80,12 +82,17 @@ pub fn draw(sheet: &Sheet) -> Canvas {
             canvas.text(x, y + 29 + l as u32 * LINE, inner, 15.0, FAINT, Face::Monospace, line);
         }
         y += label + 2;
-        let small = fitted(&column.image, shown);
-        canvas.paste(x, y, shown, &to_srgb(&small, sheet.exposure), 1);
-        frame(&mut canvas, x, y, sheet.crop, column.image.size, shown);
-        y += shown[1] + GAP;
-        let crop = column.image.crop(sheet.crop);
-        canvas.paste(x, y, crop.size, &to_srgb(&crop, sheet.exposure), sheet.enlarge);
+        let part = sheet.crop.within(column.image.size);
+        if overview {
+            let shown = inside(column.image.size, shown);
+            canvas.paste(x, y, shown, &column.look.bytes(&fitted(&column.image, shown)), 1);
+            if part.width > 0 && part.height > 0 {
+                frame(&mut canvas, x, y, part, column.image.size, shown);
+            }
+            y += above;
+        }
+        let crop = column.image.crop(part);
+        canvas.paste(x, y, crop.size, &column.look.bytes(&crop), sheet.enlarge);
         y += crop_height + GAP;
         if let Some(error) = &column.error {
             canvas.paste(x, y, error.size, &signed_colors(error), sheet.enlarge);
@@ -93,11 +100,21 @@ pub fn draw(sheet: &Sheet) -> Canvas {
     }
     let note = if has_error {
         "above: the framed part, enlarged without smoothing; below: its error against regular with 16×16 view rays on the same photons, orange too bright, blue too dark, full at ± the truth's mean"
-    } else {
+    } else if overview {
         "below each image: the framed part, enlarged without smoothing"
+    } else {
+        "enlarged without smoothing"
     };
     canvas.text(GAP, height - LINE - 4, width - 2 * GAP, 15.0, FAINT, Face::Proportional, note);
     canvas
+}
+
+/// The largest size of the same proportions as `size` that fits into `room`; at least one pixel.
+fn inside(size: [u32; 2], room: [u32; 2]) -> [u32; 2] {
+    let [w, h] = size.map(|n| u64::from(n.max(1)));
+    let [across, down] = room.map(u64::from);
+    let fitted = if across * h <= down * w { [across, across * h / w] } else { [down * w / h, down] };
+    fitted.map(|n| n.max(1) as u32)
 }
 
 /// The image at the size at which it is shown: averaged down, or enlarged without smoothing.
@@ -144,6 +161,7 @@ fn signed_colors(error: &Image) -> Vec<u8> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::export::tone::ToneMap;
     use glam::Vec3;
 
     fn sheet(error: bool) -> Canvas {
@@ -152,6 +170,7 @@ mod tests {
             lines: vec!["1.0 s".into()],
             color: PALETTE[0],
             image: Image { size: [32, 32], pixels: vec![Vec3::splat(0.5); 1024] },
+            look: Look::Tone(ToneMap::srgb(1.0)),
             error: error.then(|| Image::black([16, 12])),
         };
         draw(&Sheet {
@@ -160,7 +179,6 @@ mod tests {
             columns: vec![column("a"), column("b")],
             crop: Rect { x: 4, y: 4, width: 16, height: 12 },
             enlarge: 3,
-            exposure: 1.0,
         })
     }
 
@@ -176,5 +194,13 @@ mod tests {
     fn signs_have_their_colours() {
         let error = Image { size: [3, 1], pixels: vec![Vec3::splat(-2.0), Vec3::ZERO, Vec3::splat(2.0)] };
         assert_eq!(signed_colors(&error), [60, 150, 255, 40, 40, 40, 255, 150, 30]);
+    }
+
+    #[test]
+    fn images_of_any_size_keep_their_proportions() {
+        assert_eq!(inside([32, 32], [48, 48]), [48, 48]);
+        assert_eq!(inside([64, 16], [48, 48]), [48, 12]);
+        assert_eq!(inside([16, 64], [48, 48]), [12, 48]);
+        assert_eq!(inside([1, 1000], [10, 10]), [1, 10]);
     }
 }

@@ -1,8 +1,11 @@
-//! From radiance to eight bits: exposure, then the sRGB curve.
+//! From radiance to eight bits: exposure and offset, then a curve or false colour.
 
+use crate::export::false_color::{ColorMap, FalseColor, ValueRange};
+use crate::export::session::{Curve, Tone};
 use crate::math::elementary::pow;
 use crate::math::rgb::{Rgb, luminance};
 use crate::render::film::Image;
+use std::sync::LazyLock;
 
 /// Part of the pixels that may be brighter than white: a lamp in view should not darken what it lights.
 const CLIPPED: f64 = 0.02;
@@ -75,6 +78,8 @@ impl SrgbTable {
     }
 }
 
+static SRGB: LazyLock<SrgbTable> = LazyLock::new(SrgbTable::new);
+
 impl Default for SrgbTable {
     fn default() -> Self {
         Self::new()
@@ -85,6 +90,94 @@ impl Default for SrgbTable {
 pub fn reinhard(x: Rgb) -> Rgb {
     let l = luminance(x);
     if l > 0.0 { x / (1.0 + l) } else { x }
+}
+
+/// The colour map of that name; the first for a name that is none.
+pub fn color_map(name: Option<&str>) -> ColorMap {
+    ColorMap::ALL.into_iter().find(|m| Some(m.name()) == name).unwrap_or_default()
+}
+
+/// The scale of false colour for luminance: the tone's range, or from 0 to what is white at that exposure.
+pub fn luminance_scale(tone: &Tone, exposure: f32) -> Option<FalseColor> {
+    let map = color_map(Some(tone.false_color.as_deref()?));
+    let white = libm::exp2f(-exposure);
+    let range = tone.range.filter(|_| !tone.auto);
+    Some(FalseColor::new(map, range.map_or(ValueRange::up_to(white), |[low, high]| ValueRange { low, high })))
+}
+
+/// A tone made ready for many pixels. The window's textures and exported PNG files have their bytes from here.
+#[derive(Clone, Debug)]
+pub struct ToneMap {
+    scale: Option<FalseColor>,
+    factor: f32,
+    offset: f32,
+    curve: Curve,
+}
+
+impl ToneMap {
+    /// That of a tone whose exposure is `exposure` stops.
+    pub fn new(tone: &Tone, exposure: f32) -> Self {
+        Self {
+            scale: luminance_scale(tone, exposure),
+            factor: libm::exp2f(exposure),
+            offset: tone.offset,
+            curve: tone.curve,
+        }
+    }
+
+    /// Radiance times `factor`, then the sRGB curve.
+    pub fn srgb(factor: f32) -> Self {
+        Self { scale: None, factor, offset: 0.0, curve: Curve::Srgb }
+    }
+
+    /// The scale of false colour, if it is on.
+    pub fn scale(&self) -> Option<&FalseColor> {
+        self.scale.as_ref()
+    }
+
+    /// The three bytes of a radiance.
+    pub fn bytes(&self, table: &SrgbTable, radiance: Rgb) -> [u8; 3] {
+        if let Some(scale) = &self.scale {
+            return scale.color(luminance(radiance));
+        }
+        let mut x = radiance * self.factor + Rgb::splat(self.offset);
+        if self.curve == Curve::Reinhard {
+            x = reinhard(x);
+        }
+        let byte = |v: f32| match self.curve {
+            Curve::Srgb | Curve::Reinhard => table.byte(v),
+            Curve::Gamma => (libm::powf(v.clamp(0.0, 1.0), 1.0 / 2.2) * 255.0 + 0.5) as u8,
+            Curve::Linear => (v.clamp(0.0, 1.0) * 255.0 + 0.5) as u8,
+        };
+        x.to_array().map(byte)
+    }
+}
+
+/// How an image becomes bytes.
+#[derive(Clone, Debug)]
+pub enum Look {
+    /// It holds radiance.
+    Tone(ToneMap),
+    /// It holds the same value in all channels.
+    Values(FalseColor),
+}
+
+impl Look {
+    /// Three bytes for each pixel.
+    pub fn bytes(&self, image: &Image) -> Vec<u8> {
+        match self {
+            Self::Tone(tone) => image.pixels.iter().flat_map(|p| tone.bytes(&SRGB, *p)).collect(),
+            Self::Values(scale) => image.pixels.iter().flat_map(|p| scale.color(p.x)).collect(),
+        }
+    }
+
+    /// The scale of colours, where colours stand for values.
+    pub fn scale(&self) -> Option<&FalseColor> {
+        match self {
+            Self::Tone(tone) => tone.scale(),
+            Self::Values(scale) => Some(scale),
+        }
+    }
 }
 
 #[cfg(test)]
@@ -120,5 +213,26 @@ mod tests {
         image.pixels[3] = Vec3::splat(1e6);
         assert_eq!(auto_exposure(&image), 2.0);
         assert_eq!(auto_exposure(&Image::black([2, 2])), 1.0);
+    }
+    #[test]
+    fn a_plain_tone_is_the_srgb_curve() {
+        let pixels: Vec<Vec3> = (0..1000).map(|i| Vec3::new(i as f32, 3.0 * i as f32, -1.0) / 900.0).collect();
+        let image = Image { size: [100, 10], pixels };
+        let plain = ToneMap::new(&Tone::default(), 1.0);
+        assert_eq!(Look::Tone(plain).bytes(&image), to_srgb(&image, 2.0));
+        assert_eq!(Look::Tone(ToneMap::srgb(0.7)).bytes(&image), to_srgb(&image, 0.7));
+    }
+
+    #[test]
+    fn offset_curve_and_false_colour_count() {
+        let table = SrgbTable::new();
+        let of = |tone: Tone| ToneMap::new(&tone, 0.0).bytes(&table, Vec3::splat(0.25));
+        let plain = Tone::default();
+        assert_eq!(of(Tone { offset: 0.25, curve: Curve::Linear, ..plain.clone() }), [128; 3]);
+        assert_eq!(of(Tone { curve: Curve::Reinhard, ..plain.clone() }), [table.byte(0.2); 3]);
+        let false_color = Some("viridis".to_owned());
+        let scale = FalseColor::new(ColorMap::Viridis, ValueRange { low: 0.0, high: 0.5 });
+        let fixed = Tone { auto: false, range: Some([0.0, 0.5]), false_color, ..plain };
+        assert_eq!(of(fixed), scale.color(0.25));
     }
 }

@@ -90,6 +90,12 @@ impl Rect {
     pub fn whole(size: [u32; 2]) -> Self {
         Self { x: 0, y: 0, width: size[0], height: size[1] }
     }
+
+    /// The part of it that lies inside an image of `size` pixels; empty if none does.
+    pub fn within(self, size: [u32; 2]) -> Self {
+        let (x, y) = (self.x.min(size[0]), self.y.min(size[1]));
+        Self { x, y, width: self.width.min(size[0] - x), height: self.height.min(size[1] - y) }
+    }
 }
 
 impl Image {

@@ -11,6 +11,7 @@ use super::layout::{self, Pane};
 use super::messages::Messages;
 use super::panes::Panes;
 use super::render::Render;
+use super::watch::{self, Watch};
 use super::worker::Wake;
 use super::{bars, dialogs, theme};
 use crate::export::session::Session;
@@ -29,6 +30,7 @@ pub struct Workbench {
     pub(super) analysis: Analysis<Kind, Finding>,
     pub(super) tree: Tree<Pane>,
     context: egui::Context,
+    watch: Watch,
     /// Passes and drafts whose images have been measured.
     measured: (u64, u64),
     styled: bool,
@@ -60,9 +62,11 @@ impl Workbench {
             tree,
             document,
             context: context.clone(),
+            watch: Watch::default(),
             measured: (0, 0),
             styled: false,
         };
+        workbench.note_opened();
         workbench.new_scene();
         workbench.restart();
         Ok(workbench)
@@ -102,6 +106,7 @@ impl Workbench {
         });
         dialogs::show(ui.ctx(), &mut self.document, &mut self.desk);
         self.take_dropped(ui.ctx());
+        self.watch_scene(ui.ctx());
         self.act();
         self.look_into();
         self.ask_values();
@@ -139,13 +144,21 @@ impl Workbench {
             Finding::Opened(opened, step) => match *opened {
                 Ok(opened) => {
                     match step {
-                        Step::New => self.document.install(opened),
+                        Step::New => {
+                            self.document.install(opened);
+                            self.note_opened();
+                        }
                         Step::Taken => self.document.install_step(opened),
+                        Step::Reloaded => {
+                            self.document.install_step(opened);
+                            self.messages.note(format!("reloaded {}", self.document.session.scene));
+                        }
                         Step::Document(path) => {
                             self.document = Document::new(opened, path);
                             if let Some(tree) = self.document.session.layout.as_deref().and_then(layout::from_text) {
                                 self.tree = tree;
                             }
+                            self.note_opened();
                         }
                     }
                     self.new_scene();
@@ -173,6 +186,8 @@ impl Workbench {
             Finding::Inspected(Ok(found)) => self.desk.inspector.take(*found),
             Finding::Inspected(Err(why)) => self.messages.error(why),
             Finding::Path(path) => self.desk.inspector.path = path,
+            Finding::Exported(Ok(what)) => self.messages.note(what),
+            Finding::Exported(Err(why)) => self.messages.error(why),
             Finding::Errors(generation, errors) => {
                 if self.render.job().is_some_and(|j| j.generation == generation) {
                     for (estimator, point) in errors {
@@ -188,6 +203,7 @@ impl Workbench {
 
     /// What has to be looked at afresh when the scene is another one.
     fn new_scene(&mut self) {
+        self.read_images();
         self.desk.reference = None;
         let session = &self.document.session;
         let (scene, reference, mask) = (session.scene.clone(), session.reference.clone(), session.mask.clone());
@@ -317,6 +333,21 @@ impl Workbench {
         }
     }
 
+    /// Reads the scene again when its file has changed.
+    fn watch_scene(&mut self, context: &egui::Context) {
+        let Some(path) = self.document.source().path() else { return };
+        context.request_repaint_after(watch::INTERVAL);
+        if !self.analysis.is_busy_with(&Kind::Open) && self.watch.has_changed(path, std::time::Instant::now()) {
+            self.open(self.document.session.clone(), Step::Reloaded);
+        }
+    }
+
+    /// Puts the session's file, or else its scene, in front of what was opened before.
+    fn note_opened(&mut self) {
+        let path = self.document.path().map(|p| p.to_string_lossy().into_owned());
+        self.desk.recent.note(path.as_deref().unwrap_or(&self.document.session.scene));
+    }
+
     /// Does what was asked for in this frame.
     fn act(&mut self) {
         for action in std::mem::take(&mut self.desk.actions) {
@@ -401,6 +432,9 @@ impl Workbench {
         {
             self.tree = tree;
         }
+        if let Some(text) = storage.get_string("recent") {
+            self.desk.recent.recall(&text);
+        }
     }
 
     /// The session, for tests and for saving.
@@ -448,5 +482,6 @@ impl eframe::App for Workbench {
         if let Some(text) = layout::to_text(&self.tree) {
             storage.set_string("layout", text);
         }
+        storage.set_string("recent", self.desk.recent.to_text());
     }
 }

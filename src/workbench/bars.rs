@@ -81,6 +81,10 @@ fn menu_ui(ui: &mut Ui, menu: Menu, document: &Document, desk: &mut Desk) {
             ui.close();
         }
     }
+    if menu == Menu::File {
+        ui.separator();
+        ui.menu_button("Recent", |ui| recent_ui(ui, desk));
+    }
     if menu == Menu::View {
         ui.separator();
         for e in ESTIMATORS {
@@ -88,6 +92,15 @@ fn menu_ui(ui: &mut Ui, menu: Menu, document: &Document, desk: &mut Desk) {
                 desk.ask(Action::AddPanel(e.id.to_owned()));
                 ui.close();
             }
+        }
+    }
+}
+
+fn recent_ui(ui: &mut Ui, desk: &mut Desk) {
+    for name in desk.recent.names().to_vec() {
+        if ui.button(&name).clicked() {
+            desk.ask(Action::OpenFile(name));
+            ui.close();
         }
     }
 }

@@ -6,6 +6,7 @@ use super::dialogs::Dialogs;
 use super::gallery::values::{Origin, Values};
 use super::inspector::{FoundPath, Inspected, Inspector};
 use super::overlays::photons::VisiblePhotons;
+use super::recent::Recent;
 use crate::measure::{ErrorMetrics, Reference};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -31,6 +32,8 @@ pub enum Kind {
     Inspect,
     /// A photon's path.
     Path,
+    /// Write what is shown.
+    Export,
 }
 
 /// What the analysis thread has found.
@@ -53,6 +56,8 @@ pub enum Finding {
     Inspected(Result<Box<Inspected>, String>),
     /// The path of a photon.
     Path(Option<FoundPath>),
+    /// What was exported, or why not.
+    Exported(Result<String, String>),
 }
 
 /// How a scene that was opened comes into the history.
@@ -62,6 +67,8 @@ pub enum Step {
     New,
     /// It is a step back or forth.
     Taken,
+    /// No step: the same scene, whose file has changed.
+    Reloaded,
     /// As a new document, with the session's file.
     Document(Option<std::path::PathBuf>),
 }
@@ -119,6 +126,8 @@ pub struct Desk {
     pub photons_of: Option<usize>,
     /// Footprint areas of the last pass.
     pub areas: Areas,
+    /// What was opened last.
+    pub recent: Recent,
     /// What the user asked for in this frame.
     pub actions: Vec<Action>,
     /// Whether what the panes show needs more frames to be brought up to date.

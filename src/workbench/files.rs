@@ -38,6 +38,13 @@ impl Workbench {
         }
     }
 
+    /// Reads the images of panels that show files and have none yet.
+    pub(super) fn read_images(&mut self) {
+        let named = self.document.session.panels.iter().filter_map(|p| p.image.clone());
+        let missing: Vec<String> = named.filter(|path| !self.gallery.has_file(path)).collect();
+        missing.iter().for_each(|path| self.read_image(path));
+    }
+
     /// Reads an image for a panel.
     pub(super) fn read_image(&mut self, path: &str) {
         let path = path.to_owned();
@@ -106,10 +113,5 @@ impl Workbench {
     /// Asks where to export.
     pub(super) fn export(&mut self) {
         self.desk.dialogs.ask_path(Purpose::Export, "cusp-out/window");
-    }
-
-    /// Exports to a folder.
-    pub(super) fn export_to(&mut self, folder: &Path) {
-        self.messages.note(format!("export to {} is not there yet", folder.display()));
     }
 }

@@ -75,9 +75,11 @@ impl Workbench {
     }
 }
 
-type Work = (Origin, Box<dyn FnOnce() -> Result<Values, String> + Send>);
+/// What numbers would be made of, and how they are made.
+pub(super) type Work = (Origin, Box<dyn FnOnce() -> Result<Values, String> + Send>);
 
-fn heatmap_work(render: &Render, panel: &Panel, kind: Heatmap) -> Option<Work> {
+/// The heatmap of a panel in the first pass; None before there is one.
+pub(super) fn heatmap_work(render: &Render, panel: &Panel, kind: Heatmap) -> Option<Work> {
     let pass = Arc::clone(render.first_pass.as_ref()?);
     let name = panel.estimator.clone();
     let origin = Origin::Heatmap(kind, name.clone(), Arc::as_ptr(&pass) as usize);
@@ -86,7 +88,7 @@ fn heatmap_work(render: &Render, panel: &Panel, kind: Heatmap) -> Option<Work> {
 }
 
 /// A difference of whole passes: made again when a pass is done, not with every tile.
-fn difference_work(
+pub(super) fn difference_work(
     session: &Session,
     gallery: &Gallery,
     reference: Option<&Reference>,
