@@ -244,7 +244,7 @@ fn numbers_that_panels_show_are_files() {
     }
     let png = image::open(folder.path().join("integrated-photons_values.png")).expect("a PNG").to_rgb8();
     assert!(png.width() >= 64 && png.height() > 64 + 16, "a label and a bar lie below");
-    let scale = shown.scale(cusp::export::tone::color_map(None), None);
+    let scale = shown.scale(cusp::export::tone::color_map(None), shown.range);
     assert_eq!(png.get_pixel(30, 40).0, scale.color(shown.at([30, 40]).expect("inside")));
     // The bar runs from the low end to the high end.
     let rows = || (64..png.height()).map(|y| (4..png.width() - 4).map(move |x| (x, y)));

@@ -11,6 +11,12 @@ pub enum Action {
     OpenDialog,
     /// Open a file, whatever it is.
     OpenFile(String),
+    /// Ask for an image to compare with.
+    OpenReference,
+    /// Compare with the image of this file.
+    SetReference(String),
+    /// Compare with the scene's own reference.
+    OwnReference,
     /// Save the session, to its own file if it has one.
     SaveSession,
     /// Save the session to a file that a dialog names.
@@ -138,6 +144,8 @@ pub fn entries() -> Vec<Entry> {
     };
     let mut all = vec![
         entry(Menu::File, "Open…", Action::OpenDialog, Some((CTRL, Key::O))),
+        entry(Menu::File, "Compare with a reference image…", Action::OpenReference, None),
+        entry(Menu::File, "Compare with the scene's own reference", Action::OwnReference, None),
         entry(Menu::File, "Save session", Action::SaveSession, Some((CTRL, Key::S))),
         entry(Menu::File, "Save session as…", Action::SaveSessionAs, Some((CTRL_SHIFT, Key::S))),
         entry(Menu::File, "Save scene as TOML…", Action::SaveScene, None),

@@ -171,6 +171,7 @@ impl Workbench {
             },
             Finding::Reference(Ok(reference)) => {
                 self.desk.reference = reference.map(Arc::new);
+                self.desk.errors.clear();
                 self.after_pass();
             }
             Finding::Reference(Err(why)) => self.messages.error(why),
@@ -204,8 +205,14 @@ impl Workbench {
     /// What has to be looked at afresh when the scene is another one.
     fn new_scene(&mut self) {
         self.read_images();
+        self.read_reference();
+    }
+
+    /// Asks for the session's reference, or the scene's own.
+    fn read_reference(&mut self) {
         self.desk.reference = None;
         let session = &self.document.session;
+        self.desk.reference_of = Some((session.reference.clone(), session.mask.clone()));
         let (scene, reference, mask) = (session.scene.clone(), session.reference.clone(), session.mask.clone());
         self.analysis.ask(Kind::Reference, move || {
             Finding::Reference(match reference {
@@ -224,6 +231,11 @@ impl Workbench {
 
     /// Does what a change of the session asks for.
     fn follow(&mut self, change: Result<Change, String>, step: Step) {
+        let session = &self.document.session;
+        let reference = (session.reference.clone(), session.mask.clone());
+        if change != Ok(Change::None) && change != Ok(Change::Scene) && self.desk.reference_of != Some(reference) {
+            self.read_reference();
+        }
         match change {
             Ok(Change::None | Change::Look) => {}
             Ok(Change::Render) => self.restart(),

@@ -13,6 +13,8 @@ use std::path::PathBuf;
 pub enum Purpose {
     /// A scene, session or image to open.
     Open,
+    /// An image to compare with.
+    Reference,
     /// Where to save the session.
     SaveSession,
     /// Where to save the scene.
@@ -25,6 +27,7 @@ impl Purpose {
     fn title(self) -> &'static str {
         match self {
             Self::Open => "Open a scene, session or image",
+            Self::Reference => "Compare with a reference image (EXR or PNG)",
             Self::SaveSession => "Save the session",
             Self::SaveScene => "Save the scene as TOML",
             Self::Export => "Export to a folder",
@@ -34,6 +37,7 @@ impl Purpose {
     fn action(self, path: String) -> Action {
         match self {
             Self::Open => Action::OpenFile(path),
+            Self::Reference => Action::SetReference(path),
             Self::SaveSession => Action::SaveSessionTo(path),
             Self::SaveScene => Action::SaveSceneTo(path),
             Self::Export => Action::ExportTo(path),
@@ -160,7 +164,7 @@ fn path(
     let mut end = End::Open;
     ui.horizontal(|ui| {
         let can = !text.trim().is_empty();
-        let verb = if purpose == Purpose::Open { "Open" } else { "Save" };
+        let verb = if matches!(purpose, Purpose::Open | Purpose::Reference) { "Open" } else { "Save" };
         if ui.add_enabled(can, egui::Button::new(verb)).clicked() || entered && can {
             end = End::Do(purpose.action(text.trim().to_owned()));
         }
@@ -189,6 +193,7 @@ fn browse(context: &egui::Context, purpose: Purpose, text: &str) -> Option<Recei
             Purpose::Open => {
                 dialog.add_filter("scenes, sessions and images", &["toml", "obj", "exr", "png"]).pick_file()
             }
+            Purpose::Reference => dialog.add_filter("images", &["exr", "png"]).pick_file(),
             Purpose::SaveSession | Purpose::SaveScene => {
                 dialog.add_filter("TOML", &["toml"]).set_file_name(name).save_file()
             }

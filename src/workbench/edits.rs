@@ -2,7 +2,7 @@
 
 use super::actions::Action;
 use super::desk::Desk;
-use super::dialogs::Dialog;
+use super::dialogs::{Dialog, Purpose};
 use super::gallery::Gallery;
 use crate::estimate::registry;
 use crate::export::false_color::ColorMap;
@@ -31,6 +31,9 @@ pub fn apply(action: &Action, session: &mut Session, desk: &mut Desk, gallery: &
                 Difference::Flip => Difference::Signed,
             };
         }
+        Action::OpenReference => desk.dialogs.ask_path(Purpose::Reference, ""),
+        Action::SetReference(path) => (session.reference, session.mask) = (Some(path.clone()), None),
+        Action::OwnReference => (session.reference, session.mask) = (None, None),
         Action::CompareWith(with) => session.comparison.with = *with,
         Action::Exposure(stops) => {
             if session.tone.auto {
