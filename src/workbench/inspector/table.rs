@@ -37,7 +37,7 @@ pub fn order(inspector: &Inspector, rows: &[PhotonRow]) -> Vec<usize> {
 pub fn show(ui: &mut Ui, inspector: &mut Inspector, found: &Inspected, colors: &[Color32]) {
     let i = &found.inspection;
     let mut columns: Vec<(Column, String, f32, &str)> = vec![
-        (Column::Photon, "photon".into(), 98.0, "kind and index in its map"),
+        (Column::Photon, "photon".into(), 88.0, "kind and index in its map"),
         (Column::Power, "W".into(), 62.0, "power, the mean of the channels, W"),
         (Column::Area, "m²".into(), 62.0, "area of its ellipse, m²"),
         (Column::Distance, "dist".into(), 44.0, "distance of the hit point in filter space; inside below 1"),
@@ -46,7 +46,7 @@ pub fn show(ui: &mut Ui, inspector: &mut Inspector, found: &Inspected, colors: &
     for (e, estimator) in i.estimators.iter().enumerate() {
         let id = estimator.name.split(':').next().unwrap_or("").to_owned();
         // Weights are what one looks for, so they come right after the photon.
-        columns.insert(1 + e, (Column::Weight(e), id, 64.0, "weight under this estimator, 1/m²"));
+        columns.insert(1 + e, (Column::Weight(e), id, 60.0, "weight under this estimator, 1/m²"));
     }
     let width: f32 = columns.iter().map(|c| c.2).sum();
     egui::ScrollArea::horizontal().id_salt("photon columns").show(ui, |ui| {

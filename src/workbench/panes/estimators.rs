@@ -1,7 +1,7 @@
 //! The estimators of the panels with their settings.
 
 use super::Panes;
-use super::widgets::{choice, integer, name, rows};
+use super::widgets::{choice, integer, name, rows, swatch};
 use crate::estimate::registry::{self, ESTIMATORS};
 use crate::estimate::settings::Spec;
 use crate::render::heatmap::Heatmap;
@@ -21,9 +21,9 @@ pub(super) fn show(panes: &mut Panes, ui: &mut Ui) {
         ui.push_id(index, |ui| {
             let mut close = false;
             ui.horizontal(|ui| {
-                ui.colored_label(theme::panel_color(&names, index), "■");
+                swatch(ui, theme::panel_color(&names, index));
                 ui.strong(format!("panel {}", index + 1));
-                let button = ui.small_button("✕").on_hover_text("remove this panel");
+                let button = ui.small_button("×").on_hover_text("remove this panel");
                 name(&button, &format!("Remove panel {}", index + 1));
                 close = button.clicked();
             });

@@ -77,7 +77,10 @@ pub(super) fn errors(panes: &mut Panes, ui: &mut Ui) {
                 let color = theme::panel_color(&names, i);
                 let title = short(&names, name);
                 plot.line(Line::new(title, PlotPoints::from(points.clone())).color(color).width(1.5));
-                plot.points(Points::new(title, PlotPoints::from(points)).color(color).radius(2.0));
+                // Where there are many the line says it.
+                if points.len() <= 40 {
+                    plot.points(Points::new(title, PlotPoints::from(points)).color(color).radius(2.0));
+                }
             }
         });
 }
@@ -113,6 +116,9 @@ pub(super) fn times(panes: &mut Panes, ui: &mut Ui) {
     plot("times")
         .legend(legend(Corner::RightTop))
         .y_axis_label("ms")
+        .include_x(-0.6)
+        .include_x(count as f64 + 0.6)
+        .x_grid_spacer(move |_| (0..count).map(|i| GridMark { value: i as f64, step_size: 1.0 }).collect())
         .x_axis_formatter(move |mark, _| {
             let i = mark.value.round();
             let is_bar = (mark.value - i).abs() < 1e-6 && i >= 0.0 && (i as usize) < count;

@@ -93,6 +93,12 @@ pub fn choice(ui: &mut Ui, label: &str, tip: &str, value: &mut String, all: &[&s
     before != *value
 }
 
+/// A square of a colour.
+pub fn swatch(ui: &mut Ui, color: egui::Color32) {
+    let (rect, _) = ui.allocate_exact_size(egui::vec2(10.0, 10.0), egui::Sense::hover());
+    ui.painter().rect_filled(rect, 1.0, color);
+}
+
 /// A fact: label and text in the fixed-width face.
 pub fn fact(ui: &mut Ui, label: &str, text: impl Into<String>) {
     ui.label(label);
