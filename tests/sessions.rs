@@ -92,6 +92,16 @@ fn bad_sessions_are_refused_in_one_line() {
         ("session = 1\nscene = \"ring\"\ncrop = [1, 2, 0, 4]\n", 3, "at least 1"),
         ("session = 1\nscene = \"ring\"\nsize = [0.5, 2]\n", 3, "size"),
         ("session = 1\nscene = \"ring\n", 2, ""),
+        (
+            "session = 1\nscene = \"ring\"\n[[lights]]\nkind = \"point\"\nposition = [0, 1, 0]\npower = [-1, 0, 0]\n",
+            6,
+            "lights[0].power",
+        ),
+        (
+            "session = 1\nscene = \"ring\"\n[materials.floor]\nkind = \"diffuse\"\nreflectance = [2, 0, 0]\n",
+            5,
+            "materials.floor.reflectance",
+        ),
     ] {
         std::fs::write(&file, text).expect("writes");
         let run = compare(&file, &out);
