@@ -3,7 +3,7 @@
 #![allow(clippy::expect_used, missing_docs, reason = "a failed expectation is how this program reports")]
 
 use cusp::export::exr_file;
-use cusp::export::session::{Mode, Panel, Session};
+use cusp::export::session::{Difference, Mode, Panel, Session};
 use cusp::measure::Reference;
 use cusp::render::film::{Image, Rect};
 use cusp::workbench::Workbench;
@@ -254,6 +254,38 @@ fn numbers_that_panels_show_are_files() {
         [row[0], row[row.len() - 1]] == ends
     });
     assert!(has_bar);
+}
+
+#[test]
+fn a_difference_to_the_reference_comes_with_the_reference() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let reference = folder.path().join("grey.exr");
+    let grey = Image { size: SIZE, pixels: vec![glam::Vec3::splat(0.25); 64 * 64] };
+    exr_file::write_with(&reference, &grey, &[]).expect("writes");
+    let mut session = session();
+    session.reference = Some(reference.to_string_lossy().into_owned());
+    session.comparison.mode = Mode::Difference;
+    session.comparison.difference = Difference::Absolute;
+    session.crop = None;
+    let context = egui::Context::default();
+    let mut workbench = finished(&context, session);
+    let out = folder.path().join("out");
+    let (gravity, message) = export(&mut workbench, &context, &out);
+    assert_eq!(gravity, Gravity::Note, "{message}");
+    let image = |name: &str| read(&out.join(format!("{name}.exr")));
+    let exported = image("reference");
+    assert_eq!(bits(&exported), bits(&grey));
+    for name in ["regular", "integrated"] {
+        let (x, d) = (image(name), image(&format!("{name}_values")));
+        for ((d, x), r) in d.pixels.iter().zip(&x.pixels).zip(&exported.pixels) {
+            let expected = ((x.as_dvec3() - r.as_dvec3()).abs().element_sum() / 3.0) as f32;
+            assert_eq!(d.to_array(), [expected; 3]);
+        }
+        // Without a crop it is the whole image that is enlarged.
+        assert_eq!(bits(&image(&format!("{name}_crop"))), bits(&x));
+        let png = image::open(out.join(format!("{name}_crop.png"))).expect("a PNG");
+        assert_eq!(png.width(), 64 * ENLARGE);
+    }
 }
 
 #[test]

@@ -7,8 +7,10 @@ use cusp::math::rgb::mean;
 use cusp::measure::Reference;
 use cusp::render::film::Image;
 use cusp::workbench::Workbench;
+use cusp::workbench::actions::Action;
 use cusp::workbench::document::Opened;
 use cusp::workbench::messages::Gravity;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::time::{Duration, Instant, SystemTime};
@@ -90,6 +92,16 @@ fn bad_sessions_are_refused_in_one_line() {
         ("session = 1\nscene = \"ring\"\ncrop = [1, 2, 0, 4]\n", 3, "at least 1"),
         ("session = 1\nscene = \"ring\"\nsize = [0.5, 2]\n", 3, "size"),
         ("session = 1\nscene = \"ring\n", 2, ""),
+        (
+            "session = 1\nscene = \"ring\"\n[[lights]]\nkind = \"point\"\nposition = [0, 1, 0]\npower = [-1, 0, 0]\n",
+            6,
+            "lights[0].power",
+        ),
+        (
+            "session = 1\nscene = \"ring\"\n[materials.floor]\nkind = \"diffuse\"\nreflectance = [2, 0, 0]\n",
+            5,
+            "materials.floor.reflectance",
+        ),
     ] {
         std::fs::write(&file, text).expect("writes");
         let run = compare(&file, &out);
@@ -160,4 +172,45 @@ fn a_scene_that_changes_on_disk_is_read_again() {
     assert_eq!((errors.len(), errors[0].times), (1, 1), "{errors:?}");
     assert!(errors[0].text.contains("mine.toml:1"), "{errors:?}");
     assert_eq!(shown(&workbench), after, "the window goes on with the scene that it has");
+}
+
+/// What eframe keeps between two starts.
+#[derive(Default)]
+struct Memory(BTreeMap<String, String>);
+
+impl eframe::Storage for Memory {
+    fn get_string(&self, key: &str) -> Option<String> {
+        self.0.get(key).cloned()
+    }
+
+    fn set_string(&mut self, key: &str, value: String) {
+        self.0.insert(key.to_owned(), value);
+    }
+
+    fn remove_string(&mut self, key: &str) {
+        self.0.remove(key);
+    }
+
+    fn flush(&mut self) {}
+}
+
+#[test]
+fn what_was_opened_is_remembered() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = session_file(folder.path(), 1.0).to_string_lossy().into_owned();
+    let small = Session { size: Some([16, 16]), passes: 1, ..Session::of("plane") };
+    let context = egui::Context::default();
+    let start = || Workbench::new(&context, Opened::new(small.clone()).expect("opens"), None).expect("threads");
+    let mut memory = Memory::default();
+    let mut workbench = start();
+    workbench.run(Action::OpenFile(file.clone()));
+    workbench.run(Action::OpenFile(folder.path().join("nowhere.toml").to_string_lossy().into_owned()));
+    run_until(&mut workbench, &context, |w| w.messages().all().iter().any(|m| m.gravity == Gravity::Error));
+    workbench.run(Action::OpenFile(file.clone()));
+    run_until(&mut workbench, &context, |w| w.session().scene == "ring");
+    assert_eq!(workbench.desk().recent.names(), [file.as_str(), "plane"]);
+    eframe::App::save(&mut workbench, &mut memory);
+    let mut again = start();
+    again.recall(&memory);
+    assert_eq!(again.desk().recent.names(), ["plane", file.as_str()]);
 }

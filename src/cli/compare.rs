@@ -120,8 +120,11 @@ impl<'a> Comparison<'a> {
         let start = Instant::now();
         let of_session = Session::is_one(args.scene.as_ref());
         // Here `--estimator` may be a list, like `--estimators`.
-        let (session, _) = session(&args.scene, &CommonFlags { estimator: None, ..args.flags.clone() })?;
-        let scene = if of_session { session.open_scene()?.1 } else { open(&args.scene)? };
+        let (session, path) = session(&args.scene, &CommonFlags { estimator: None, ..args.flags.clone() })?;
+        let scene = match path {
+            Some(path) => session.open_scene().map_err(|e| session.place(e, &path))?.1,
+            None => open(&args.scene)?,
+        };
         let mut settings = RenderSettings::new(&scene, &session.render, session.size, session.seed)?;
         settings.plan = args.flags.plan.into();
         if args.estimators.is_some() && args.flags.estimator.is_some() {

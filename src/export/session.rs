@@ -349,6 +349,21 @@ impl Session {
         Ok((source, scene))
     }
 
+    /// An error of [`Session::open_scene`] at the line of the session's `file` where the session's own camera,
+    /// materials or lights are wrong; any other as it is.
+    pub fn place(&self, error: SceneError, file: &Path) -> SceneError {
+        let SceneError::At { key, what, .. } = &error else { return error };
+        let starts =
+            |table: &str| key.strip_prefix(table).is_some_and(|rest| rest.is_empty() || rest.starts_with(['.', '[']));
+        let own = (self.lights.is_some() && starts("lights"))
+            || (self.camera.is_some() && starts("camera"))
+            || self.materials.keys().any(|name| starts(&format!("materials.{name}")));
+        match std::fs::read_to_string(file) {
+            Ok(text) if own => crate::scene::locate::Locator::new(file, &text).error(key.clone(), what.clone()),
+            _ => error,
+        }
+    }
+
     /// The distinct estimators of the panels, in their order.
     pub fn estimators(&self) -> Vec<Box<dyn Estimator>> {
         let mut all: Vec<Box<dyn Estimator>> = Vec::new();

@@ -135,7 +135,7 @@ impl Export {
         let cut = Cut::new(crop, self.session.enlarge, 1);
         let mut files = Vec::new();
         let mut columns = Vec::new();
-        let unfinished = self.panels.iter().filter(|p| !p.fresh).count();
+        let unfinished = self.session.panels.len() - self.panels.iter().filter(|p| p.fresh).count();
         let shown = std::mem::take(&mut self.panels);
         let stems = names::distinct(&shown.iter().map(|s| file_names(&s.panel)).collect::<Vec<_>>());
         for (shown, name) in shown.into_iter().zip(&stems) {
@@ -148,6 +148,9 @@ impl Export {
             columns.push(column(values.unwrap_or(radiance), color));
         }
         if let Some(reference) = self.shown_reference() {
+            // The same numbers would name another part of an image of another size.
+            let part = if reference.image.size == size { crop } else { Rect::whole(reference.image.size) };
+            let cut = Cut { crop: part, ..cut };
             files.extend(reference.write(&self.folder, "reference", cut, &provenance).map_err(wrong)?);
         }
         let sheet = sheet::draw(&self.sheet(columns, crop));
@@ -233,7 +236,12 @@ impl Export {
                 "{w}x{h} pixels, {emitted} photons emitted, footprint scale {}, seed {}",
                 settings.footprint_scale, settings.seed
             ),
-            enlarge: Cut::new(crop, self.session.enlarge, columns.len() as u32).enlarge,
+            // Whole images are large as they are.
+            enlarge: if crop == Rect::whole(settings.size) {
+                1
+            } else {
+                Cut::new(crop, self.session.enlarge, columns.len() as u32).enlarge
+            },
             columns,
             crop,
         }
