@@ -104,6 +104,7 @@ impl Workbench {
         self.take_dropped(ui.ctx());
         self.act();
         self.look_into();
+        self.ask_images();
         self.ask_values();
         self.ask_photons();
         let held = ui.input(|i| i.pointer.any_down());
@@ -227,7 +228,7 @@ impl Workbench {
         if let Some(image) = shown {
             let exposure = crate::export::tone::auto_exposure(image.image()).log2();
             // A small step would only make the images flicker.
-            if (exposure - self.desk.auto_exposure).abs() > 0.1 {
+            if self.desk.untimed || (exposure - self.desk.auto_exposure).abs() > 0.1 {
                 self.desk.auto_exposure = exposure;
             }
         }
@@ -392,6 +393,12 @@ impl Workbench {
         {
             self.tree = tree;
         }
+    }
+
+    /// Leaves out what differs from run to run: times, memory, and an exposure that lags behind the images. Once the
+    /// window is idle, the same session gives the same picture.
+    pub fn for_pictures(&mut self) {
+        self.desk.untimed = true;
     }
 
     /// The session, for tests and for saving.

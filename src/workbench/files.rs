@@ -41,6 +41,7 @@ impl Workbench {
     /// Reads an image for a panel.
     pub(super) fn read_image(&mut self, path: &str) {
         let path = path.to_owned();
+        self.desk.asked_images.insert(path.clone());
         self.analysis.ask(Kind::Image(path.clone()), move || {
             let read = crate::measure::Reference::from_files(path.as_ref(), None).map(|r| r.image);
             Finding::Image(path, read)

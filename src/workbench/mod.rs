@@ -24,6 +24,7 @@ pub mod overlays;
 pub mod painter;
 pub mod panes;
 pub mod render;
+pub mod shot;
 pub mod theme;
 pub mod viewport;
 pub mod views;
