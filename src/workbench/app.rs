@@ -406,6 +406,11 @@ impl Workbench {
         &self.document.session
     }
 
+    /// The session to be edited, as a widget would; what that asks for is done at the end of the next frame.
+    pub fn session_mut(&mut self) -> &mut Session {
+        &mut self.document.session
+    }
+
     /// The document.
     pub fn document(&self) -> &Document {
         &self.document
