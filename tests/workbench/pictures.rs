@@ -1,7 +1,7 @@
 //! Pictures of the window, kept in `tests/snapshots/`: every part of it, on fixed seeds, without times.
 
 use super::renderer::check;
-use super::window::{Window, beside, images_only, on_screen, open, open_at, settle, small, type_text};
+use super::window::{Window, beside, images_only, lit, on_screen, open, open_at, settle, small, type_text};
 use cusp::export::session::{Difference, Mode, Panel, Session};
 use cusp::render::heatmap::Heatmap;
 use cusp::workbench::actions::Action;
@@ -131,11 +131,12 @@ fn overlays(ids: &[&str], panel: usize, zoom: f32) -> Window {
     session.panels.truncate(1);
     let mut session = images_only(Session { layout: None, ..session });
     session.overlays = ids.iter().map(|id| (*id).to_owned()).collect();
-    session.pins = vec![[50, 62]];
+    let pixel = lit(&session);
+    session.pins = vec![pixel];
     session.view.zoom = zoom;
-    session.view.center = [0.52, 0.64];
+    session.view.center = pixel.map(|x| (x as f32 + 0.5) / 96.0);
     let mut window = open_at(session, LITTLE, 1.0);
-    let at = on_screen(&window, 0, [46, 58]);
+    let at = on_screen(&window, 0, [pixel[0] - 1, pixel[1] + 1]);
     window.hover_at(at);
     settle(&mut window);
     window
@@ -183,7 +184,7 @@ fn pins_and_crop() {
 
 fn inspector(size: [f32; 2], pixels_per_point: f32) -> Window {
     let mut session = beside(small("ring", 4), Pane::Inspector);
-    session.pins = vec![[50, 62]];
+    session.pins = vec![lit(&session)];
     let mut window = open_at(session, size, pixels_per_point);
     let row = {
         let rows = window.query_all_by_label_contains("photon ").filter_map(|n| n.accesskit_node().label());

@@ -218,6 +218,50 @@ fn old_events_are_dropped() {
     assert_eq!(tiles_seen, 64);
 }
 
+/// A worker ends when its window is gone, however many jobs wait for it and whether or not its events are taken.
+#[test]
+fn a_busy_worker_ends_with_its_window() {
+    let (done, ended) = crossbeam_channel::bounded(1);
+    std::thread::spawn(move || {
+        let mut session = small("ring", 2);
+        session.passes = 1000;
+        for round in 0..12u64 {
+            let mut worker = Worker::start(no_wake()).expect("a thread");
+            let first = job(&session, 1);
+            worker.render(first.clone());
+            std::thread::sleep(Duration::from_millis(10 * round));
+            for generation in 2..12 {
+                worker.render(Job { generation, ..first.clone() });
+            }
+            if round % 3 == 0 {
+                worker.gate().pause();
+            }
+            drop(worker);
+        }
+        done.send(()).expect("the test waits");
+    });
+    assert!(ended.recv_timeout(LIMIT).is_ok(), "the thread does not end");
+}
+
+/// Tiles that wait at the gate hold up nothing but the render.
+#[test]
+fn a_heatmap_is_made_while_the_render_is_paused() {
+    let mut window = open(small("ring", 1));
+    window.state_mut().session_mut().passes = 100_000;
+    until("some passes", || {
+        window.step();
+        window.state().render().passes_seen > 3
+    });
+    window.state_mut().run(Action::Pause);
+    std::thread::sleep(Duration::from_millis(50));
+    window.state_mut().session_mut().panels[0].heatmap = Some("photons".into());
+    until("the heatmap", || {
+        window.step();
+        window.state().gallery().values.contains_key(&0)
+    });
+    assert!(window.state().render().is_paused());
+}
+
 /// A scene that no file can hold: its surfaces name a material that there is not.
 fn broken(session: &Session, generation: u64) -> Job {
     let job = job(session, generation);

@@ -4,6 +4,7 @@ use super::renderer::app;
 use cusp::estimate::Estimator;
 use cusp::export::session::{Panel, Session};
 use cusp::render::film::Image;
+use cusp::render::inspect::inspect;
 use cusp::render::{RenderSettings, Renderer, Silent};
 use cusp::workbench::Workbench;
 use cusp::workbench::document::Opened;
@@ -159,6 +160,18 @@ pub fn fresh(session: &Session) -> Renderer {
         renderer.step(&Silent);
     }
     renderer
+}
+
+/// The pixel of the first pass that the most photons reach, among those that see one of its first caustic photons.
+pub fn lit(session: &Session) -> [u32; 2] {
+    let renderer = fresh(&Session { passes: 1, ..session.clone() });
+    let pass = renderer.last_pass().expect("one pass");
+    let photons = pass.maps.caustic.as_ref().expect("a scene with caustics").photons();
+    let pixels = photons.iter().take(40).filter_map(|p| pass.scene.camera.project(p.position, pass.settings.size));
+    let pixels =
+        pixels.map(|p| p.map(|x| x as u32)).filter(|p| p[0] < pass.settings.size[0] && p[1] < pass.settings.size[1]);
+    let reached = |p: &[u32; 2]| inspect(pass, renderer.estimators(), *p).expect("inside").rows.len();
+    pixels.max_by_key(reached).expect("a photon is in the image")
 }
 
 /// That every panel's image holds the bits of a fresh render of the session.

@@ -21,9 +21,10 @@ pub(super) fn show(panes: &mut Panes, ui: &mut Ui) {
         ui.push_id(index, |ui| {
             let mut close = false;
             ui.horizontal(|ui| {
-                ui.colored_label(theme::panel_color(&names, index), "■");
+                let (swatch, _) = ui.allocate_exact_size(egui::Vec2::splat(10.0), egui::Sense::hover());
+                ui.painter().rect_filled(swatch, 1.0, theme::panel_color(&names, index));
                 ui.strong(format!("panel {}", index + 1));
-                let button = ui.small_button("✕").on_hover_text("remove this panel");
+                let button = ui.small_button("×").on_hover_text("remove this panel");
                 name(&button, &format!("Remove panel {}", index + 1));
                 close = button.clicked();
             });

@@ -17,7 +17,7 @@ pub(super) fn show(panes: &mut Panes, ui: &mut Ui) {
     let mut gone = None;
     for (i, m) in panes.messages.all().iter().enumerate().rev() {
         ui.horizontal_wrapped(|ui| {
-            let button = ui.small_button("✕");
+            let button = ui.small_button("×");
             name(&button, &format!("Dismiss message {}", i + 1));
             if button.clicked() {
                 gone = Some(i);
