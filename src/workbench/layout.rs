@@ -151,9 +151,10 @@ pub fn show(tree: &mut Tree<Pane>, pane: Pane) {
     }
 }
 
-/// The layout as text for a session.
+/// The layout as text for a session, the same for the same layout.
 pub fn to_text(tree: &Tree<Pane>) -> Option<String> {
-    serde_json::to_string(tree).ok()
+    // The tree holds its tiles in no order; a JSON value sorts its keys.
+    serde_json::to_value(tree).ok().map(|value| value.to_string())
 }
 
 /// A layout from a session's text; None if it is of another version.

@@ -97,10 +97,12 @@ fn changes_at_random_end_in_the_right_image() {
         let mut random = Pcg32::seed_from_u64(seed);
         let start = Instant::now();
         let (mut changes, mut first_tiles) = (0, 0);
-        while start.elapsed() < Duration::from_millis(1600) {
+        while start.elapsed() < Duration::from_millis(1600) || first_tiles < 20 {
+            assert!(start.elapsed() < LIMIT, "{changes} changes, {first_tiles} of them seen");
             change(&mut window, &mut random);
             changes += 1;
-            for _ in 0..=random.next_u32() % 4 {
+            // Most are overtaken by the next.
+            for _ in 0..[1, 2, 4, 30][random.next_u32() as usize % 4] {
                 window.step();
                 std::thread::sleep(Duration::from_micros(u64::from(random.next_u32() % 4000)));
             }
@@ -111,7 +113,6 @@ fn changes_at_random_end_in_the_right_image() {
                 window.state_mut().session_mut().passes = 40;
             }
         }
-        assert!(changes > 50 && first_tiles > 5, "{changes} changes, {first_tiles} of them seen");
         // A scene that is on its way may still replace the session.
         let calm = Instant::now();
         while calm.elapsed() < Duration::from_millis(400) {
