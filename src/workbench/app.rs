@@ -13,7 +13,7 @@ use super::panes::Panes;
 use super::render::Render;
 use super::worker::Wake;
 use super::{bars, dialogs, theme};
-use crate::export::session::Session;
+use crate::export::session::{Panel, Session};
 use crate::measure::Reference;
 use egui_tiles::Tree;
 use std::path::PathBuf;
@@ -157,7 +157,13 @@ impl Workbench {
                 self.after_pass();
             }
             Finding::Reference(Err(why)) => self.messages.error(why),
-            Finding::Image(path, Ok(image)) => self.gallery.put_file(&path, image),
+            Finding::Image(path, Ok(image)) => {
+                self.gallery.put_file(&path, image);
+                let panels = &mut self.document.session.panels;
+                if !panels.iter().any(|p| p.image.as_ref() == Some(&path)) {
+                    panels.push(Panel { image: Some(path), ..Panel::of("") });
+                }
+            }
             Finding::Image(_, Err(why)) => self.messages.error(why),
             Finding::Areas(areas) => self.desk.areas = areas,
             Finding::Values(panel, Ok(values)) => drop(self.gallery.values.insert(panel, values)),

@@ -45,7 +45,8 @@ pub fn top(ui: &mut Ui, document: &Document, render: &Render, desk: &mut Desk) {
                 desk.ask(Action::StepPass);
             }
             ui.separator();
-            ui.label(mono(progress(render, desk)));
+            // As a whole on the next row if it does not fit.
+            ui.add(egui::Label::new(mono(progress(render, desk))).extend());
             ui.separator();
             for (mode, title, action) in [
                 (Mode::Grid, "grid", Action::Grid),

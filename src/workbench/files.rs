@@ -3,7 +3,7 @@
 use super::app::Workbench;
 use super::desk::{Finding, Kind, Step};
 use super::dialogs::Purpose;
-use crate::export::session::{Panel, Session};
+use crate::export::session::Session;
 use crate::export::whole_file;
 use std::path::Path;
 
@@ -27,10 +27,8 @@ impl Workbench {
                 Ok(session) => self.open(session, Step::Document(Some(path.into()))),
                 Err(why) => self.messages.error(why.to_string()),
             },
-            "exr" | "png" => {
-                self.document.session.panels.push(Panel { image: Some(path.to_owned()), ..Panel::of("") });
-                self.read_image(path);
-            }
+            // It becomes a panel once it is read.
+            "exr" | "png" => self.read_image(path),
             _ => {
                 let session = session_for(&self.document.session, path);
                 self.open(session, Step::New);

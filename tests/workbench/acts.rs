@@ -153,6 +153,7 @@ fn a_missing_file_is_one_error_that_is_dismissed() {
     }
     let messages = window.state().messages().all();
     assert_eq!(messages.iter().filter(|m| m.gravity == Gravity::Error).count(), 3, "{messages:?}");
+    assert_eq!(window.state().session().panels.len(), 1, "what can't be read is no panel");
     window.get_by_label("Dismiss all").click();
     settle(&mut window);
     assert!(window.state().messages().all().is_empty());

@@ -58,7 +58,7 @@ fn show_header(panes: &mut Panes, ui: &mut Ui, index: usize, panel: &Panel, rect
     let mut right = String::new();
     if let Some(image) = panes.gallery.of(panel) {
         if panel.image.is_none() {
-            right = format!("{} passes", image.passes);
+            right = format!("{} pass{}", image.passes, if image.passes == 1 { "" } else { "es" });
         }
         if let Some(e) = panes.desk.error_of(&panel.estimator).filter(|_| panel.image.is_none()) {
             right = format!("err {:.2} %   {right}", 100.0 * e.error.relative_rmse);
