@@ -368,3 +368,31 @@ fn interrupt(child: std::process::Child) -> Output {
     assert_eq!(out.status.code(), Some(130), "{}", text(&out.stderr));
     out
 }
+
+/// The same window gives the same bits; wrong calls are refused.
+#[test]
+fn shot_draws_the_window() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let draw = |name: &str| {
+        let file = folder.path().join(name);
+        let args = ["shot", "--size", "48x48", "--photons", "2000", "--passes", "2", "--pixel", "20,30", "--overlays"];
+        let more = ["tiles", "--window", "700x500", "--quiet", "-o", path(&file)];
+        let out = cusp(&[&args[..], &more[..]].concat());
+        assert!(out.status.success() && out.stdout.is_empty(), "{}", text(&out.stderr));
+        let picture = image::open(&file).expect("a picture").to_rgb8();
+        assert_eq!(picture.dimensions(), (700, 500));
+        let bytes = std::fs::read(&file).expect("reads");
+        assert!(bytes.windows(12).any(|w| w == b"cusp.command"));
+        picture
+    };
+    assert!(draw("a.png") == draw("b.png"), "two calls give different pictures");
+    let out = folder.path().join("c.png");
+    let o = path(&out);
+    refused(&["shot", "-o", "c.jpg"], 2, "end the name in .png");
+    refused(&["shot", "-o", o, "--window", "10x10"], 2, "--window: sides must lie in");
+    refused(&["shot", "-o", o, "--overlays", "ghost"], 2, "there are footprint");
+    refused(&["shot", "-o", o, "--pixel", "999,1"], 2, "--pixel: lies outside");
+    refused(&["shot", "-o", o, "--maximize", "5"], 2, "numbered 1 to 4");
+    refused(&["shot", "-o", o, "nowhere"], 2, "built in: ring");
+    assert!(!out.exists());
+}

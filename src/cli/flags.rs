@@ -142,6 +142,21 @@ impl CommonFlags {
             Some(n) => Err(Failure::Call(format!("--threads: must lie in 1 to 1024, got {n}"))),
         }
     }
+
+    /// Sets the number of threads of all work of this process that chooses none itself.
+    ///
+    /// # Errors
+    /// A number of threads that can't be.
+    pub fn set_threads(&self) -> Result<(), Failure> {
+        match self.threads {
+            None => Ok(()),
+            Some(n @ 1..=1024) => rayon::ThreadPoolBuilder::new()
+                .num_threads(n)
+                .build_global()
+                .map_err(|e| Failure::Work(format!("--threads {n}: {e}"))),
+            Some(n) => Err(Failure::Call(format!("--threads: must lie in 1 to 1024, got {n}"))),
+        }
+    }
 }
 
 /// A whole number, as in `200000` or `2e5`.
@@ -156,7 +171,10 @@ fn count(text: &str) -> Result<i64, String> {
 }
 
 /// `WxH`.
-fn size(text: &str) -> Result<[u32; 2], String> {
+///
+/// # Errors
+/// A text that is no pair of whole numbers.
+pub fn size(text: &str) -> Result<[u32; 2], String> {
     let wrong = || "write WIDTHxHEIGHT, as in 512x512".to_owned();
     let (w, h) = text.split_once(['x', 'X']).ok_or_else(wrong)?;
     let side = |s: &str| s.parse::<u32>().map_err(|_| wrong());

@@ -11,6 +11,7 @@ mod inspect_text;
 pub mod lists;
 pub mod progress;
 pub mod render;
+pub mod shot;
 pub mod table;
 pub mod window;
 
@@ -42,6 +43,8 @@ enum Command {
     Inspect(inspect::InspectArgs),
     /// Every metric of an image against another, and the difference image
     Diff(diff::DiffArgs),
+    /// The workbench drawn to a file, without a window
+    Shot(shot::ShotArgs),
     /// The built-in scenes
     Scenes(lists::ListArgs),
     /// The estimators and their settings
@@ -68,6 +71,7 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
         Some(Command::Render(args)) => render::run(&args),
         Some(Command::Inspect(args)) => inspect::run(&args),
         Some(Command::Diff(args)) => diff::run(&args),
+        Some(Command::Shot(args)) => shot::run(&args),
         Some(Command::Scenes(args)) => lists::scenes(&args),
         Some(Command::Estimators(args)) => lists::estimators(&args),
         None => window::run(cli.scene.unwrap_or_else(|| "ring".into()), cli.flags),

@@ -14,7 +14,7 @@ use super::render::Render;
 use super::watch::{self, Watch};
 use super::worker::Wake;
 use super::{bars, dialogs, theme};
-use crate::export::session::Session;
+use crate::export::session::{Panel, Session};
 use crate::measure::Reference;
 use egui_tiles::Tree;
 use std::path::PathBuf;
@@ -109,6 +109,7 @@ impl Workbench {
         self.watch_scene(ui.ctx());
         self.act();
         self.look_into();
+        self.ask_images();
         self.ask_values();
         self.ask_photons();
         let held = ui.input(|i| i.pointer.any_down());
@@ -175,7 +176,13 @@ impl Workbench {
                 self.after_pass();
             }
             Finding::Reference(Err(why)) => self.messages.error(why),
-            Finding::Image(path, Ok(image)) => self.gallery.put_file(&path, &image),
+            Finding::Image(path, Ok(image)) => {
+                self.gallery.put_file(&path, &image);
+                let panels = &mut self.document.session.panels;
+                if !panels.iter().any(|p| p.image.as_ref() == Some(&path)) {
+                    panels.push(Panel { image: Some(path), ..Panel::of("") });
+                }
+            }
             Finding::Image(_, Err(why)) => self.messages.error(why),
             Finding::Areas(areas) => self.desk.areas = areas,
             Finding::Values(panel, Ok(values)) => drop(self.gallery.values.insert(panel, values)),
@@ -204,7 +211,6 @@ impl Workbench {
 
     /// What has to be looked at afresh when the scene is another one.
     fn new_scene(&mut self) {
-        self.read_images();
         self.read_reference();
     }
 
@@ -260,7 +266,7 @@ impl Workbench {
         if let Some(image) = shown {
             let exposure = crate::export::tone::auto_exposure(image.image()).log2();
             // A small step would only make the images flicker.
-            if (exposure - self.desk.auto_exposure).abs() > 0.1 {
+            if self.desk.untimed || (exposure - self.desk.auto_exposure).abs() > 0.1 {
                 self.desk.auto_exposure = exposure;
             }
         }
@@ -449,9 +455,20 @@ impl Workbench {
         }
     }
 
+    /// Leaves out what differs from run to run: times, memory, and an exposure that lags behind the images. Once the
+    /// window is idle, the same session gives the same picture.
+    pub fn for_pictures(&mut self) {
+        self.desk.untimed = true;
+    }
+
     /// The session, for tests and for saving.
     pub fn session(&self) -> &Session {
         &self.document.session
+    }
+
+    /// The session to be edited, as a widget would; what that asks for is done at the end of the next frame.
+    pub fn session_mut(&mut self) -> &mut Session {
+        &mut self.document.session
     }
 
     /// The document.

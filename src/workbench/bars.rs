@@ -8,7 +8,7 @@ use super::layout::{self, Pane};
 use super::messages::{Gravity, Messages};
 use super::panes::widgets::name;
 use super::render::Render;
-use super::theme::{count, mono, number, seconds};
+use super::theme::{count, mono, number};
 use crate::estimate::registry::ESTIMATORS;
 use crate::export::session::Mode;
 use crate::math::rgb::luminance;
@@ -45,7 +45,8 @@ pub fn top(ui: &mut Ui, document: &Document, render: &Render, desk: &mut Desk) {
                 desk.ask(Action::StepPass);
             }
             ui.separator();
-            ui.label(mono(progress(render)));
+            // As a whole on the next row if it does not fit.
+            ui.add(egui::Label::new(mono(progress(render, desk))).extend());
             ui.separator();
             for (mode, title, action) in [
                 (Mode::Grid, "grid", Action::Grid),
@@ -119,13 +120,13 @@ fn scene_box(ui: &mut Ui, document: &Document, desk: &mut Desk) {
 }
 
 /// How far the render is, as in `pass 12 / 3.4 s   2.4 M photons (18 k caustic)`.
-fn progress(render: &Render) -> String {
+fn progress(render: &Render, desk: &Desk) -> String {
     let mut text = String::new();
     // Writing to a string cannot fail.
     if let Some(p) = &render.progress {
         let s = &p.seconds;
         let total = s.photon_trace + s.map_build + s.view_trace + s.gather + s.estimate;
-        let _ = write!(text, "pass {} / {}", p.passes.iter().min().unwrap_or(&0), seconds(total));
+        let _ = write!(text, "pass {} / {}", p.passes.iter().min().unwrap_or(&0), desk.seconds(total));
         let _ = write!(text, "   photons {}", count(p.emitted));
         for (n, kind) in [(p.stored.direct, "direct"), (p.stored.caustic, "caustic"), (p.stored.global, "global")] {
             if n > 0 {

@@ -8,7 +8,7 @@ use super::inspector::{FoundPath, Inspected, Inspector};
 use super::overlays::photons::VisiblePhotons;
 use super::recent::Recent;
 use crate::measure::{ErrorMetrics, Reference};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 /// A kind of work for the analysis thread.
@@ -122,6 +122,8 @@ pub struct Desk {
     pub inspector: Inspector,
     /// What each panel's numbers were asked for last.
     pub asked_values: BTreeMap<usize, Origin>,
+    /// Image files that were asked for.
+    pub asked_images: BTreeSet<String>,
     /// Photons that the camera sees, for the overlay.
     pub visible_photons: VisiblePhotons,
     /// The pass that they are of, by its address.
@@ -134,12 +136,19 @@ pub struct Desk {
     pub actions: Vec<Action>,
     /// Whether what the panes show needs more frames to be brought up to date.
     pub unfinished: bool,
+    /// Whether measured times and memory are left out, so that the same work gives the same picture.
+    pub untimed: bool,
 }
 
 impl Desk {
     /// Asks for an action at the end of the frame.
     pub fn ask(&mut self, action: Action) {
         self.actions.push(action);
+    }
+
+    /// Seconds with a fitting unit; a dash where times are left out.
+    pub fn seconds(&self, s: f64) -> String {
+        if self.untimed { "-".into() } else { super::theme::seconds(s) }
     }
 
     /// The last error of an estimator.

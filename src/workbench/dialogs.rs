@@ -220,13 +220,18 @@ fn go_to(ui: &mut egui::Ui, text: &mut String, size: [u32; 2], fresh: bool) -> E
     }
 }
 
+/// Height of a list that leaves room for the rest of its dialog in a low window, points.
+fn list_height(ui: &egui::Ui) -> f32 {
+    (ui.ctx().content_rect().height() - 220.0).clamp(80.0, 420.0)
+}
+
 fn palette(ui: &mut egui::Ui, text: &mut String, fresh: bool) -> End {
     let entered = field(ui, "Search", text, 300.0, fresh);
     let words: Vec<String> = text.split_whitespace().map(str::to_lowercase).collect();
     let found: Vec<_> =
         entries().into_iter().filter(|e| words.iter().all(|w| e.title.to_lowercase().contains(w))).collect();
     let mut end = End::Open;
-    egui::ScrollArea::vertical().max_height(320.0).show(ui, |ui| {
+    egui::ScrollArea::vertical().max_height(list_height(ui)).show(ui, |ui| {
         egui::Grid::new("palette").num_columns(2).striped(true).show(ui, |ui| {
             for e in &found {
                 if ui.add(egui::Button::new(e.title).frame(false)).clicked() {
@@ -256,7 +261,7 @@ fn shortcuts(ui: &mut egui::Ui) -> End {
         ("Fill the middle with a panel", "double click"),
         ("Orbit the camera", "right drag"),
     ];
-    egui::ScrollArea::vertical().max_height(420.0).show(ui, |ui| {
+    egui::ScrollArea::vertical().max_height(list_height(ui)).show(ui, |ui| {
         egui::Grid::new("shortcuts").num_columns(2).striped(true).show(ui, |ui| {
             let keys =
                 entries().into_iter().filter_map(|e| e.shortcut.map(|s| (e.title, ui.ctx().format_shortcut(&s))));

@@ -3,7 +3,7 @@
 use super::app::Workbench;
 use super::desk::{Finding, Kind, Step};
 use super::dialogs::Purpose;
-use crate::export::session::{Panel, Session};
+use crate::export::session::Session;
 use crate::export::whole_file;
 use std::path::Path;
 
@@ -27,10 +27,8 @@ impl Workbench {
                 Ok(session) => self.open(session, Step::Document(Some(path.into()))),
                 Err(why) => self.messages.error(why.to_string()),
             },
-            "exr" | "png" => {
-                self.document.session.panels.push(Panel { image: Some(path.to_owned()), ..Panel::of("") });
-                self.read_image(path);
-            }
+            // It becomes a panel once it is read.
+            "exr" | "png" => self.read_image(path),
             _ => {
                 let session = session_for(&self.document.session, path);
                 self.open(session, Step::New);
@@ -38,16 +36,10 @@ impl Workbench {
         }
     }
 
-    /// Reads the images of panels that show files and have none yet.
-    pub(super) fn read_images(&mut self) {
-        let named = self.document.session.panels.iter().filter_map(|p| p.image.clone());
-        let missing: Vec<String> = named.filter(|path| !self.gallery.has_file(path)).collect();
-        missing.iter().for_each(|path| self.read_image(path));
-    }
-
     /// Reads an image for a panel.
     pub(super) fn read_image(&mut self, path: &str) {
         let path = path.to_owned();
+        self.desk.asked_images.insert(path.clone());
         self.analysis.ask(Kind::Image(path.clone()), move || {
             let read = crate::measure::Reference::from_files(path.as_ref(), None).map(|r| r.image);
             Finding::Image(path, read)

@@ -26,6 +26,7 @@ pub mod painter;
 pub mod panes;
 pub mod recent;
 pub mod render;
+pub mod shot;
 pub mod theme;
 pub mod viewport;
 pub mod views;

@@ -35,6 +35,16 @@ pub fn other_side<'a>(
 }
 
 impl Workbench {
+    /// Asks once for the files of panels that a session or a step of the history brought.
+    pub(super) fn ask_images(&mut self) {
+        let files = self.document.session.panels.iter().filter_map(|p| p.image.clone());
+        for path in files.collect::<Vec<_>>() {
+            if !self.gallery.has_file(&path) && !self.desk.asked_images.contains(&path) {
+                self.read_image(&path);
+            }
+        }
+    }
+
     /// Asks for the photons of the overlay: those of the first pass, which stay as they are while the render goes on.
     pub(super) fn ask_photons(&mut self) {
         let on = self.document.session.overlays.iter().any(|o| o == "photons");
@@ -53,7 +63,7 @@ impl Workbench {
         self.gallery.values.retain(|panel, _| *panel < count);
         self.desk.asked_values.retain(|panel, _| *panel < count);
         for (index, panel) in session.panels.iter().enumerate() {
-            let wanted = match heatmap_of(panel) {
+            let wanted = match heatmap_of(panel).filter(|h| !(self.desk.untimed && *h == Heatmap::TileMilliseconds)) {
                 Some(kind) => heatmap_work(&self.render, panel, kind),
                 None if shows_difference(session, index) => {
                     let stops = if session.tone.auto { self.desk.auto_exposure } else { session.tone.exposure };

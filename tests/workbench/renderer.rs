@@ -3,6 +3,7 @@
 //! egui draws its glyphs with fused multiply-adds where the processor has them. On an x86-64 machine without AVX2 and
 //! FMA about one glyph pixel in 100 000 differs by one level, and a picture with such a pixel fails there.
 
+use cusp::workbench::Workbench;
 use cusp::workbench::painter::Painter;
 use egui::{Context, FullOutput, TexturesDelta, Ui};
 use egui_kittest::{Harness, SnapshotOptions, TestRenderer};
@@ -52,6 +53,20 @@ pub fn harness<'a>(size: [f32; 2], pixels_per_point: f32, ui: impl FnMut(&mut Ui
         .with_options(SnapshotOptions::new().threshold(0.0).max_failed_pixels(0).output_path(SNAPSHOTS))
         .renderer(PainterRenderer::default())
         .build_ui(ui)
+}
+
+/// A harness around the workbench, which fills a window of `size` points.
+pub fn app(
+    size: [f32; 2],
+    pixels_per_point: f32,
+    build: impl FnOnce(&Context) -> Workbench,
+) -> Harness<'static, Workbench> {
+    Harness::builder()
+        .with_size(size)
+        .with_pixels_per_point(pixels_per_point)
+        .with_options(SnapshotOptions::new().threshold(0.0).max_failed_pixels(0).output_path(SNAPSHOTS))
+        .renderer(PainterRenderer::default())
+        .build_eframe(|creation| build(&creation.egui_ctx))
 }
 
 /// Compares the last frame with `tests/snapshots/{name}.png`, bit for bit.

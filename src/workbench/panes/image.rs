@@ -59,7 +59,7 @@ fn show_header(panes: &mut Panes, ui: &mut Ui, index: usize, panel: &Panel, rect
     let mut right = String::new();
     if let Some(image) = panes.gallery.of(panel) {
         if panel.image.is_none() {
-            right = format!("{} passes", image.passes);
+            right = format!("{} pass{}", image.passes, if image.passes == 1 { "" } else { "es" });
         }
         if let Some(e) = panes.desk.error_of(&panel.estimator).filter(|_| panel.image.is_none()) {
             right = format!("err {:.2} %   {right}", 100.0 * e.error.relative_rmse);
@@ -314,13 +314,17 @@ fn navigate(panes: &mut Panes, ui: &mut Ui, index: usize, viewport: &Viewport, r
 }
 
 fn drag_crop(panes: &mut Panes, viewport: &Viewport, response: &egui::Response, at: egui::Pos2) {
-    let place = viewport.to_image(at);
     let [w, h] = panes.document.settings().size;
     let inside = |x: f32, n: u32| (x.max(0.0) as u32).min(n.saturating_sub(1));
-    let pixel = [inside(place.x, w), inside(place.y, h)];
+    let pixel_at = |at: egui::Pos2| {
+        let place = viewport.to_image(at);
+        [inside(place.x, w), inside(place.y, h)]
+    };
+    let pixel = pixel_at(at);
     let start = match panes.desk.crop_drag {
         Some(Some(start)) if !response.drag_started() => start,
-        _ => pixel,
+        // A drag is known as one only when the pointer has left the place where the button was pressed.
+        _ => response.ctx.input(|i| i.pointer.press_origin()).map_or(pixel, pixel_at),
     };
     if response.dragged() || response.drag_started() {
         panes.desk.crop_drag = Some(Some(start));

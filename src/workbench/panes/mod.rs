@@ -60,7 +60,8 @@ impl Behavior<Pane> for Panes<'_> {
         if let Pane::Image(panel) = pane {
             return if image::show(self, ui, *panel) { UiResponse::DragStarted } else { UiResponse::None };
         }
-        ui.painter().rect_filled(ui.available_rect_before_wrap(), 0.0, ui.visuals().panel_fill);
+        // What a pane holds may be less than its place.
+        ui.painter().rect_filled(ui.max_rect(), 0.0, ui.visuals().panel_fill);
         egui::Frame::new().inner_margin(6).show(ui, |ui| {
             let scroll = egui::ScrollArea::vertical().auto_shrink(false);
             match pane {

@@ -203,7 +203,7 @@ fn tiles(panes: &Panes, painter: &Painter, index: usize, viewport: &Viewport) {
         if at.width() >= LABELLED
             && let Some(seconds) = image.seconds(tile)
         {
-            let text = format!("{} ms", number(seconds * 1e3));
+            let text = if panes.desk.untimed { "-".into() } else { format!("{} ms", number(seconds * 1e3)) };
             painter.text(
                 min + egui::vec2(3.0, 2.0),
                 Align2::LEFT_TOP,

@@ -2,7 +2,7 @@
 
 use super::Panes;
 use super::widgets::{fact, rows};
-use crate::workbench::theme::{mono, seconds};
+use crate::workbench::theme::mono;
 use egui::{RichText, Ui};
 
 pub(super) fn show(panes: &mut Panes, ui: &mut Ui) {
@@ -33,7 +33,7 @@ pub(super) fn show(panes: &mut Panes, ui: &mut Ui) {
             ("Gather", p.seconds.gather),
             ("Estimate", p.seconds.estimate),
         ] {
-            fact(ui, label, seconds(s));
+            fact(ui, label, panes.desk.seconds(s));
         }
         let stored = &pass.photons.stored;
         let photons = stored.direct.len() + stored.caustic.len() + stored.global.len();
@@ -41,6 +41,7 @@ pub(super) fn show(panes: &mut Panes, ui: &mut Ui) {
         fact(ui, "Photons of a pass", mib(photons * size_of::<crate::photons::Photon>()));
         let mapped: usize = pass.maps.all().map(|m| m.photons().len()).sum();
         fact(ui, "Map photons", mib(mapped * size_of::<crate::photons::MapPhoton>()));
-        fact(ui, "Peak memory", crate::render::stats::peak_rss_bytes().map_or("unknown".into(), |b| mib(b as usize)));
+        let peak = crate::render::stats::peak_rss_bytes().filter(|_| !panes.desk.untimed);
+        fact(ui, "Peak memory", peak.map_or("-".into(), |b| mib(b as usize)));
     });
 }

@@ -6,6 +6,9 @@ use egui::{Color32, Ui};
 use egui_plot::{Bar, BarChart, Corner, GridMark, HoverPosition, Legend, Line, Plot, PlotPoints, Points};
 use std::ops::RangeInclusive;
 
+/// In place of plots of times where those are left out.
+const UNTIMED: &str = "Times differ from run to run and are not shown in pictures.";
+
 /// A mark of an axis that holds powers of ten: 0.001, 1, 1e6; nothing between whole powers when they are dense.
 fn power_of_ten(mark: GridMark, _range: &RangeInclusive<f64>) -> String {
     let x = mark.value;
@@ -49,6 +52,10 @@ pub(super) fn errors(panes: &mut Panes, ui: &mut Ui) {
     });
     if panes.desk.reference.is_none() {
         ui.weak("No reference is loaded. Built-in scenes bring one; drop an EXR, or name it in a session.");
+        return;
+    }
+    if panes.desk.untimed {
+        ui.weak(UNTIMED);
         return;
     }
     let session = &panes.document.session;
@@ -95,6 +102,10 @@ pub(super) fn times(panes: &mut Panes, ui: &mut Ui) {
         ui.weak("No pass is done.");
         return;
     };
+    if panes.desk.untimed {
+        ui.weak(UNTIMED);
+        return;
+    }
     let mut stacks = vec![Vec::new(); PHASES.len()];
     for i in 0..job.estimators.len() {
         let passes = f64::from(progress.passes.get(i).copied().unwrap_or(0).max(1));

@@ -89,6 +89,8 @@ impl Drop for Worker {
         // The worker may be waiting for room for an event.
         while self.events.try_recv().is_ok() {}
         let _ = self.commands.try_send(Command::Quit);
+        // With no room for that, the thread ends when it finds the channel closed behind the last job.
+        self.commands = bounded(0).0;
         if let Some(thread) = self.thread.take() {
             // It looks at the gate before each tile and each send, so this takes no longer than a tile. A thread that
             // has panicked has said so already.

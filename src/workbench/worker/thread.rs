@@ -23,7 +23,13 @@ const PATIENCE: Duration = Duration::from_millis(5);
 
 /// Renders what comes in until it is told to quit or the window is gone; a panic is reported and ends the thread.
 pub(super) fn run(inbox: &Receiver<Command>, outbox: &Sender<Event>, gate: &Gate, wake: &Wake) {
-    let work = AssertUnwindSafe(|| Loop { inbox, outbox, gate, wake, renderer: None }.run());
+    // Threads of its own: while it is paused its tiles wait in them, and others have work for the shared ones.
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(rayon::current_num_threads())
+        .thread_name(|i| format!("cusp-tiles-{i}"))
+        .build()
+        .ok();
+    let work = AssertUnwindSafe(|| Loop { inbox, outbox, gate, wake, pool, renderer: None }.run());
     if let Err(panic) = catch_unwind(work) {
         let what = panic
             .downcast_ref::<&str>()
@@ -41,6 +47,8 @@ struct Loop<'a> {
     outbox: &'a Sender<Event>,
     gate: &'a Gate,
     wake: &'a Wake,
+    /// Its own threads; without them it takes those that all share.
+    pool: Option<rayon::ThreadPool>,
     renderer: Option<Renderer>,
 }
 
@@ -55,7 +63,13 @@ impl Loop<'_> {
                     Command::Quit => return,
                 }
             }
-            self.job(&job);
+            match self.pool.take() {
+                Some(pool) => {
+                    pool.install(|| self.job(&job));
+                    self.pool = Some(pool);
+                }
+                None => self.job(&job),
+            }
         }
     }
 
