@@ -92,7 +92,7 @@ fn an_ellipse_is_the_photons_footprint() {
     let photon = &pass.maps.of(row.kind).expect("stored").photons()[row.index as usize];
     assert_eq!((photon.position, photon.axes()), (row.position, row.footprint));
     assert!(label.ends_with(&format!(" {}", row.index)), "{label}");
-    let (view, camera) = (viewport(&window, 0), pass.scene.camera.clone());
+    let (view, camera) = (viewport(&window, 0), pass.scene.camera);
     let [a, b] = photon.axes();
     let expected = |n: usize| -> Vec<Pos2> {
         let corner = |i: usize| {
