@@ -119,11 +119,6 @@ fn heatmaps_at_1() {
     picture(heatmaps(), [720.0, 420.0], "heatmaps");
 }
 
-#[test]
-fn heatmaps_at_1_5() {
-    check(&mut open_at(heatmaps(), [400.0, 300.0], 1.5), "heatmaps_1_5");
-}
-
 /// One image with overlays, a pinned pixel and the pointer on another; zoomed in where light gathers.
 fn overlays(ids: &[&str], panel: usize, zoom: f32) -> Window {
     let mut session = images(4);
@@ -207,7 +202,7 @@ fn inspector_with_a_chosen_row() {
 
 #[test]
 fn inspector_at_1_5() {
-    check(&mut inspector(AT_1_5, 1.5, false), "inspector_1_5");
+    check(&mut inspector([400.0, 400.0], 1.5, false), "inspector_1_5");
 }
 
 fn pane(pane: Pane, name: &str) {
@@ -304,13 +299,6 @@ fn a_menu() {
     window.remove_cursor();
     settle(&mut window);
     check(&mut window, "menu_view");
-}
-
-#[test]
-fn no_panel() {
-    let mut session = small("ring", 1);
-    session.panels.clear();
-    picture(Session { layout: None, ..session }, PANE, "no_panel");
 }
 
 /// A scene with neither light nor surface.
