@@ -190,8 +190,8 @@ pub fn gravity_color(gravity: Gravity) -> Color32 {
 /// The surface that a pixel sees first: its material, and where it lies in the scene's own coordinates.
 fn place(render: &Render, pixel: [u32; 2]) -> Option<String> {
     let pass = render.current_pass()?;
-    let seen = crate::render::inspect::inspect(pass, &[], pixel).ok()?;
-    let Some(first) = seen.path.first() else { return Some("nothing".into()) };
+    let seen = crate::render::inspect::view_path(pass, pixel).ok()?;
+    let Some(first) = seen.first() else { return Some("nothing".into()) };
     let at = first.position.as_dvec3() + pass.scene.origin;
     let [x, y, z] = at.to_array().map(number);
     let name = pass.scene.material_names.get(first.material as usize).map_or("", String::as_str);

@@ -5,6 +5,7 @@ use super::messages::Messages;
 use super::worker::messages::{Event, Job, Progress};
 use super::worker::{Wake, Worker};
 use crate::render::Pass;
+use std::cell::Cell;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -101,6 +102,8 @@ impl Render {
         let Some(mut worker) = self.worker.take() else { return };
         let start = Instant::now();
         let mut failed = false;
+        // Whoever measures the images does so before tiles of the next pass are in them.
+        let pass_done = Cell::new(false);
         worker.events(
             self.generation,
             |event| match event {
@@ -125,6 +128,7 @@ impl Render {
                     messages.set_warnings(&progress.warnings);
                     self.progress = Some(*progress);
                     self.passes_seen += 1;
+                    pass_done.set(true);
                 }
                 Event::Finished { .. } => self.finished = true,
                 Event::Failed { why } => {
@@ -132,7 +136,7 @@ impl Render {
                     failed = true;
                 }
             },
-            || start.elapsed() > PATIENCE,
+            || pass_done.get() || start.elapsed() > PATIENCE,
         );
         if !failed {
             self.worker = Some(worker);

@@ -15,9 +15,9 @@ use crate::math::rgb::Rgb;
 use crate::photons::{MapPhoton, PhotonKind};
 use crate::render::film::Rect;
 use crate::render::pass::Pass;
-use crate::render::plan::Slot;
+use crate::render::plan::{Plan, Slot};
 use crate::render::renderer::slots;
-use crate::render::view::ViewCounts;
+use crate::render::view::{ViewCounts, ViewTracer};
 use crate::render::view_pass::{Scratch, ViewPass};
 use crate::render::watch::Silent;
 use glam::{DVec3, Vec3};
@@ -180,6 +180,25 @@ pub fn inspect(pass: &Pass, estimators: &[Box<dyn Estimator>], pixel: [u32; 2]) 
     let estimators = values.collect();
     let rows = account.rows();
     Ok(Inspection { pixel, pass: pass.number, estimators, hits: account.hits, path: account.path, rows })
+}
+
+/// The surfaces that the one ray of a pixel meets, with view footprints whether or not the pass needed them.
+///
+/// Follows one ray, so it may be asked for in every frame. Light is left out of the vertices.
+///
+/// # Errors
+/// A pixel outside the image.
+pub fn view_path(pass: &Pass, pixel: [u32; 2]) -> Result<Vec<PathVertex>, InspectError> {
+    let size = pass.settings.size;
+    if pixel[0] >= size[0] || pixel[1] >= size[1] {
+        return Err(InspectError::Outside { pixel, size });
+    }
+    let plan = Plan { view_differentials: true, shadow_rays: false, ..pass.plan.clone() };
+    let own = pass.view();
+    let view = ViewPass { tracer: ViewTracer { plan: &plan, ..own.tracer }, ..own };
+    let mut account = Account { view: &view, slots: &[], hits: Vec::new(), path: Vec::new(), rows: BTreeMap::new() };
+    account.add_rays(Rect { x: pixel[0], y: pixel[1], width: 1, height: 1 }, 1);
+    Ok(account.path)
 }
 
 impl Inspection {

@@ -185,3 +185,22 @@ fn a_pass_alone_is_that_of_a_render() {
         assert_eq!(alone.area_factor.to_bits(), rendered.area_factor.to_bits());
     }
 }
+
+/// A pass that is planned without view differentials still tells the view footprint of a pixel.
+#[test]
+fn view_paths_have_footprints_in_any_plan() {
+    let with = pass("ring", &by("overlap"), "integrated", 1);
+    let without = pass("ring", &by("overlap"), "regular", 1);
+    assert!(with.plan.view_differentials && !without.plan.view_differentials);
+    for pixel in [[20, 30], [33, 25], [5, 5]] {
+        let (a, b) = (view_path(&with, pixel).expect("inside"), view_path(&without, pixel).expect("inside"));
+        let full = inspect(&with, &[], pixel).expect("inside").path;
+        assert_eq!(a.len(), full.len());
+        for ((a, b), full) in a.iter().zip(&b).zip(&full) {
+            assert_eq!((a.position, a.footprint), (full.position, full.footprint));
+            assert_eq!((a.position, a.footprint), (b.position, b.footprint));
+            assert!(a.footprint[0].length() > 0.0);
+        }
+    }
+    assert!(view_path(&with, [SIZE[0], 0]).is_err());
+}

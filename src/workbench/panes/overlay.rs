@@ -2,7 +2,7 @@
 
 use super::Panes;
 use crate::photons::PhotonKind;
-use crate::render::inspect::inspect;
+use crate::render::inspect::view_path;
 use crate::workbench::inspector::plane::{corners, kind_color};
 use crate::workbench::inspector::summary::centroid;
 use crate::workbench::theme::number;
@@ -78,8 +78,8 @@ pub(super) fn draw(panes: &Panes, painter: &Painter, index: usize, viewport: &Vi
 fn footprint(projection: &Projection, painter: &Painter) {
     let panes = projection.panes;
     let (Some(hover), Some(pass)) = (panes.desk.hover_before, panes.render.current_pass()) else { return };
-    let Ok(seen) = inspect(pass, &[], hover.pixel) else { return };
-    for vertex in &seen.path {
+    let Ok(seen) = view_path(pass, hover.pixel) else { return };
+    for vertex in &seen {
         let Some(outline) = projection.all(&corners(vertex.position, vertex.footprint)) else { continue };
         if vertex.depth == 0 {
             painter.add(Shape::closed_line(outline, Stroke::new(1.5, GREEN)));
