@@ -126,7 +126,7 @@ impl<'a> Comparison<'a> {
             None => open(&args.scene)?,
         };
         let mut settings = RenderSettings::new(&scene, &session.render, session.size, session.seed)?;
-        settings.plan = args.flags.plan.into();
+        settings.plan = session.plan;
         if args.estimators.is_some() && args.flags.estimator.is_some() {
             return Err(Failure::Call("--estimator: is in --estimators already; give one of them".into()));
         }

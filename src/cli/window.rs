@@ -2,9 +2,10 @@
 
 use crate::cli::compare::{self, CompareArgs};
 use crate::cli::failure::Failure;
-use crate::cli::flags::CommonFlags;
+use crate::cli::flags::{CommonFlags, PlanFlag};
 use crate::estimate::registry;
 use crate::export::session::{Panel, Session};
+use crate::render::settings::PlanMode;
 use crate::workbench::document::Opened;
 use crate::workbench::window;
 use std::path::{Path, PathBuf};
@@ -17,10 +18,13 @@ pub fn run(scene: String, flags: CommonFlags) -> Result<(), Failure> {
     let (session, path) = session(&scene, &flags)?;
     let opened = Opened::new(session).map_err(Failure::Call)?;
     let why = match window::display() {
-        Ok(()) => match window::open(opened, path) {
-            Ok(()) => return Ok(()),
-            Err(why) => why,
-        },
+        Ok(()) => {
+            flags.set_threads()?;
+            match window::open(opened, path) {
+                Ok(()) => return Ok(()),
+                Err(why) => why,
+            }
+        }
         Err(why) => why,
     };
     if !flags.quiet && !flags.json {
@@ -40,6 +44,9 @@ pub fn session(scene: &str, flags: &CommonFlags) -> Result<(Session, Option<Path
     flags.onto(&mut session.render);
     session.size = flags.size.or(session.size);
     session.seed = flags.seed.unwrap_or(session.seed);
+    if flags.plan == PlanFlag::Full {
+        session.plan = PlanMode::Full;
+    }
     if let Some(list) = &flags.estimator {
         session.panels = registry::estimators(list)?.iter().map(|e| Panel::of(e.name())).collect();
         session.render.estimator = None;

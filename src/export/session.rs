@@ -3,6 +3,7 @@
 use crate::estimate::{Estimator, registry};
 pub use crate::measure::difference::Difference;
 use crate::render::film::Rect;
+use crate::render::settings::PlanMode;
 use crate::scene::scene_file::{CameraFile, LightFile, MaterialFile, RenderFile, SceneFile};
 use crate::scene::{SceneError, Source};
 use serde::{Deserialize, Serialize};
@@ -32,6 +33,9 @@ pub struct Session {
     /// Passes after which the window rests.
     #[serde(default = "many_passes")]
     pub passes: u32,
+    /// Whether parts that the scene does not need are left out (needed) or forced on (full).
+    #[serde(default)]
+    pub plan: PlanMode,
     /// Image to compare with, relative to the session's folder, in place of a built-in scene's own.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reference: Option<String>,
@@ -233,6 +237,7 @@ impl Session {
             size: None,
             seed: one(),
             passes: many_passes(),
+            plan: PlanMode::Needed,
             reference: None,
             mask: None,
             crop: None,

@@ -5,7 +5,7 @@ use crate::math::sequence::Sampling;
 use crate::photons::spread::DiffuseSpread;
 use crate::scene::Scene;
 use crate::scene::scene_file::RenderFile;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// How photons are looked up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -42,7 +42,7 @@ pub enum DirectLight {
 }
 
 /// Whether parts that the scene does not need are left out.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Default)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Default)]
 #[serde(rename_all = "snake_case")]
 pub enum PlanMode {
     /// They are.

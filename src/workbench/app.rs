@@ -149,7 +149,14 @@ impl Workbench {
                             self.document.install(opened);
                             self.note_opened();
                         }
-                        Step::Taken => self.document.install_step(opened),
+                        Step::Taken => {
+                            // What was edited while the scene was read is not lost.
+                            let wanted = self.document.session.clone();
+                            self.document.install_step(opened);
+                            if wanted.scene == self.document.session.scene {
+                                self.document.session = wanted;
+                            }
+                        }
                         Step::Reloaded => {
                             self.document.install_step(opened);
                             self.messages.note(format!("reloaded {}", self.document.session.scene));

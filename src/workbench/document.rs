@@ -58,7 +58,10 @@ impl Opened {
 }
 
 fn settings(scene: &Scene, session: &Session) -> Result<RenderSettings, String> {
-    RenderSettings::new(scene, &session.render, session.size, session.seed).map_err(|e| e.to_string())
+    let mut settings =
+        RenderSettings::new(scene, &session.render, session.size, session.seed).map_err(|e| e.to_string())?;
+    settings.plan = session.plan;
+    Ok(settings)
 }
 
 impl Document {
@@ -123,8 +126,8 @@ impl Document {
             self.scene = Arc::new(scene.map_err(|e| e.to_string())?);
             change = Change::Render;
         }
-        if change == Change::Render || now.render != before.render || now.size != before.size || now.seed != before.seed
-        {
+        let same_settings = now.render == before.render && now.plan == before.plan;
+        if change == Change::Render || !same_settings || now.size != before.size || now.seed != before.seed {
             self.settings = settings(&self.scene, now)?;
             change = Change::Render;
         }
