@@ -117,6 +117,7 @@ fn wrong_scene_files_are_named_with_line_and_key() {
         (format!("{camera}[render]\nestimator = \"sharp\"\n"), 6, "render.estimator"),
         (camera.replace("40", "\"wide\""), 4, "fov_y"),
         (camera.replace("40", "180"), 4, "camera.fov_y"),
+        (format!("{camera}resolution = [32768, 32768]\n"), 5, "camera.resolution: has 1073741824 pixels"),
         (format!("{camera}[["), 5, ""),
         (mesh("nowhere.obj"), 9, "no such file"),
     ] {

@@ -27,7 +27,7 @@ use crate::render::settings::{Gather, LightPart, PlanMode, RenderSettings};
 use crate::render::tiles::tiles;
 use crate::render::view_pass::ViewPass;
 use crate::render::{Plan, Renderer};
-use crate::scene::open;
+use crate::scene::{built_in, open};
 use clap::{Args, ValueEnum};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -121,9 +121,13 @@ impl<'a> Comparison<'a> {
         let of_session = Session::is_one(args.scene.as_ref());
         // Here `--estimator` may be a list, like `--estimators`.
         let (session, path) = session(&args.scene, &CommonFlags { estimator: None, ..args.flags.clone() })?;
-        let scene = match path {
-            Some(path) => session.open_scene().map_err(|e| session.place(e, &path))?.1,
-            None => open(&args.scene)?,
+        let (scene, edited) = match path {
+            Some(path) => {
+                let (source, scene) = session.open_scene().map_err(|e| session.place(e, &path))?;
+                let edited = scene.hash != source.scene.hash;
+                (scene, edited)
+            }
+            None => (open(&args.scene)?, false),
         };
         let mut settings = RenderSettings::new(&scene, &session.render, session.size, session.seed)?;
         settings.plan = session.plan;
@@ -146,9 +150,13 @@ impl<'a> Comparison<'a> {
         let mask = if args.reference.is_some() { args.mask.clone() } else { session.mask.as_ref().map(PathBuf::from) };
         let reference = match &given {
             Some(path) => Some(Reference::from_files(path, mask.as_deref()).map_err(Failure::Call)?),
+            None if edited => None,
             None => Reference::built_in(&session.scene).map_err(Failure::Work)?,
         };
         let mut notes = Vec::new();
+        if edited && given.is_none() && built_in::find(&session.scene).is_some_and(|b| b.reference.is_some()) {
+            notes.push("no error against the built-in reference: the session edits the scene".to_owned());
+        }
         let reference = match (reference, &given) {
             // A reference shows all light; of any other there is no error to speak of.
             (Some(_), _) if settings.light != LightPart::All => {

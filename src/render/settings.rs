@@ -102,7 +102,7 @@ pub const MAX_PHOTONS: i64 = 1 << 31;
 /// Largest number of pixels across or down.
 pub const MAX_SIZE: u32 = crate::scene::load::MAX_RESOLUTION as u32;
 /// Largest number of pixels.
-pub const MAX_PIXELS: u64 = 1 << 26;
+pub const MAX_PIXELS: u64 = crate::scene::load::MAX_PIXELS;
 
 impl RenderSettings {
     /// The scene's settings with `flags` on top. `size` and `seed` are the command line's alone.

@@ -178,6 +178,7 @@ impl Workbench {
                 }
             },
             Finding::Reference(Ok(reference)) => {
+                self.gallery.set_reference(reference.as_ref().map(|r| &r.image));
                 self.desk.reference = reference.map(Arc::new);
                 self.desk.errors.clear();
                 self.after_pass();
@@ -224,12 +225,16 @@ impl Workbench {
     /// Asks for the session's reference, or the scene's own.
     fn read_reference(&mut self) {
         self.desk.reference = None;
+        self.gallery.set_reference(None);
         let session = &self.document.session;
-        self.desk.reference_of = Some((session.reference.clone(), session.mask.clone()));
+        self.desk.reference_of = Some(self.document.reference());
+        let edited = self.document.is_edited();
         let (scene, reference, mask) = (session.scene.clone(), session.reference.clone(), session.mask.clone());
         self.analysis.ask(Kind::Reference, move || {
             Finding::Reference(match reference {
                 Some(path) => Reference::from_files(path.as_ref(), mask.as_ref().map(|m| m.as_ref())).map(Some),
+                // The stored image shows the scene as it is built in.
+                None if edited => Ok(None),
                 None => Reference::built_in(&scene),
             })
         });
@@ -244,8 +249,7 @@ impl Workbench {
 
     /// Does what a change of the session asks for.
     fn follow(&mut self, change: Result<Change, String>, step: Step) {
-        let session = &self.document.session;
-        let reference = (session.reference.clone(), session.mask.clone());
+        let reference = self.document.reference();
         if change != Ok(Change::None) && change != Ok(Change::Scene) && self.desk.reference_of != Some(reference) {
             self.read_reference();
         }

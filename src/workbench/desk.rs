@@ -114,8 +114,8 @@ pub struct Desk {
     pub auto_exposure: f32,
     /// What panels are compared with by default.
     pub reference: Option<Arc<Reference>>,
-    /// Reference and mask that were asked for last; None for the scene's own.
-    pub reference_of: Option<(Option<String>, Option<String>)>,
+    /// What was asked for last.
+    pub reference_of: Option<super::document::ReferenceOf>,
     /// Error curves by estimator.
     pub errors: BTreeMap<String, Vec<ErrorPoint>>,
     /// The inspector.

@@ -64,7 +64,20 @@ fn settings(scene: &Scene, session: &Session) -> Result<RenderSettings, String> 
     Ok(settings)
 }
 
+/// What decides which reference there is: its file and mask, and whether the scene is as it is built in.
+pub type ReferenceOf = (Option<String>, Option<String>, bool);
+
 impl Document {
+    /// What decides which reference there is.
+    pub fn reference(&self) -> ReferenceOf {
+        (self.session.reference.clone(), self.session.mask.clone(), self.is_edited())
+    }
+
+    /// Whether camera, lights or materials are not those of the scene's file.
+    pub fn is_edited(&self) -> bool {
+        self.scene.hash != self.source.scene.hash
+    }
+
     /// A session whose scene has been opened. `path` is the session's own file, if it has one.
     pub fn new(opened: Opened, path: Option<PathBuf>) -> Self {
         let Opened { session, source, scene, settings } = opened;

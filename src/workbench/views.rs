@@ -76,7 +76,14 @@ impl Workbench {
                     continue;
                 }
             };
-            let Some((origin, work)) = wanted else { continue };
+            let Some((origin, work)) = wanted else {
+                // Without the other side there is no difference, and an old one would be wrong.
+                if shows_difference(session, index) && heatmap_of(panel).is_none() {
+                    self.gallery.values.remove(&index);
+                    self.desk.asked_values.remove(&index);
+                }
+                continue;
+            };
             if self.desk.asked_values.get(&index) != Some(&origin) {
                 self.desk.asked_values.insert(index, origin);
                 self.analysis.ask(Kind::Values(index), move || Finding::Values(index, work()));

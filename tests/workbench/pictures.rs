@@ -53,6 +53,13 @@ fn split_panels() {
 }
 
 #[test]
+fn split_against_the_reference() {
+    let mut session = images(2);
+    session.comparison.mode = Mode::Split;
+    picture(session, LITTLE, "split_reference");
+}
+
+#[test]
 fn the_other_side() {
     let mut session = images(2);
     session.comparison.with = Some(1);

@@ -159,3 +159,21 @@ fn differences_are_those_of_the_files() {
     settle(&mut window);
     assert!(window.state().gallery().values.is_empty());
 }
+
+/// A stored reference shows the scene as it is built in: of an edited one there is no error, and undo brings it back.
+#[test]
+fn an_edited_scene_has_no_stored_reference() {
+    let mut session = small("ring", 2);
+    session.comparison.mode = Mode::Difference;
+    let mut window = open(session);
+    assert!(window.state().desk().reference.is_some() && window.state().gallery().values.len() == 2);
+    let mut camera = window.state().document().scene_file().camera.expect("has one");
+    camera.position[0] += 0.5;
+    window.state_mut().session_mut().camera = Some(camera);
+    settle(&mut window);
+    assert!(window.state().desk().reference.is_none() && window.state().desk().errors.is_empty());
+    assert!(window.state().gallery().values.is_empty(), "no difference to an image of another view");
+    window.state_mut().run(Action::Undo);
+    settle(&mut window);
+    assert!(window.state().desk().reference.is_some() && window.state().gallery().values.len() == 2);
+}

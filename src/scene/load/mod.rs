@@ -17,6 +17,8 @@ use std::path::Path;
 
 /// Largest number of pixels of an image across or down.
 pub const MAX_RESOLUTION: i64 = 32_768;
+/// Largest number of pixels of an image.
+pub const MAX_PIXELS: u64 = 1 << 26;
 /// Largest coordinate, length or factor that a file may hold.
 const MAX_LENGTH: f64 = 1e15;
 /// Largest power, radiance or irradiance.
@@ -223,6 +225,11 @@ impl<'a> Loader<'a> {
         let resolution = c.resolution.unwrap_or([512, 512]);
         if resolution.iter().any(|r| !(1..=MAX_RESOLUTION).contains(r)) {
             return self.wrong("camera.resolution", format!("must lie in 1 to {MAX_RESOLUTION}, got {resolution:?}"));
+        }
+        let pixels = resolution.iter().product::<i64>() as u64;
+        if pixels > MAX_PIXELS {
+            let most = MAX_PIXELS >> 20;
+            return self.wrong("camera.resolution", format!("has {pixels} pixels; {most} million (of 2²⁰) at most"));
         }
         Ok(CameraSource { position, target, up, fov_y: c.fov_y, resolution: resolution.map(|r| r as u32) })
     }

@@ -22,6 +22,10 @@ pub struct Gallery {
     rendered: BTreeMap<String, LiveImage>,
     /// By path.
     files: BTreeMap<String, LiveImage>,
+    /// The reference, if there is one.
+    reference: Option<LiveImage>,
+    /// The texture that shows it.
+    pub reference_texture: PanelTexture,
     /// Numbers of panels that show a heatmap or a difference.
     pub values: BTreeMap<usize, Values>,
     /// One for each panel.
@@ -71,6 +75,17 @@ impl Gallery {
     /// Whether that file's image is here.
     pub fn has_file(&self, path: &str) -> bool {
         self.files.contains_key(path)
+    }
+
+    /// Takes in another reference, or none.
+    pub fn set_reference(&mut self, image: Option<&Image>) {
+        self.reference = image.map(LiveImage::whole);
+        self.reference_texture = PanelTexture::default();
+    }
+
+    /// The reference.
+    pub fn reference(&self) -> Option<&LiveImage> {
+        self.reference.as_ref()
     }
 
     /// Range of the colours of a panel's numbers: that of all panels that show the same, so that they can be compared.

@@ -110,15 +110,18 @@ fn draw(panes: &mut Panes, ui: &mut Ui, index: usize, panel: &Panel, viewport: &
     let painter = ui.painter().with_clip_rect(viewport.panel);
     update_texture(panes, ui.ctx(), index, panel);
     let session = &panes.document.session;
-    let other = session.comparison.with.unwrap_or(usize::MAX);
+    let other = match session.comparison.with {
+        Some(i) => panes.gallery.textures.get(i).and_then(|t| t.id()),
+        None => panes.gallery.reference_texture.id(),
+    };
     let whole = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
     let texture = |i: usize| panes.gallery.textures.get(i).and_then(|t| t.id());
-    let own = if panes.desk.flipped { texture(other).or(texture(index)) } else { texture(index) };
+    let own = if panes.desk.flipped { other.or(texture(index)) } else { texture(index) };
     if let Some(id) = own {
         painter.image(id, viewport.image(), whole, Color32::WHITE);
     }
     if session.comparison.mode == Mode::Split
-        && let Some(id) = texture(other)
+        && let Some(id) = other
     {
         let divider = session.comparison.divider.clamp(0.0, 1.0);
         let mut right = viewport.image();
@@ -238,6 +241,27 @@ fn update_texture(panes: &mut Panes, context: &egui::Context, index: usize, pane
         }
     }
     panes.gallery.textures[index] = texture;
+    update_reference(panes, context, exposure);
+}
+
+/// The reference's texture, where something shows it.
+fn update_reference(panes: &mut Panes, context: &egui::Context, exposure: f32) {
+    let comparison = &panes.document.session.comparison;
+    if comparison.with.is_some() || !(panes.desk.flipped || comparison.mode == Mode::Split) {
+        return;
+    }
+    let tone = &panes.document.session.tone;
+    let shade = Shade::new(tone, exposure);
+    let key = key_of(&Panel::of("reference"), tone, exposure);
+    let mut texture = std::mem::take(&mut panes.gallery.reference_texture);
+    if let Some(image) = panes.gallery.reference() {
+        let color = |x: u32, y: u32| shade.color(&SRGB, image.image().at(x, y));
+        let late = panes.is_late();
+        if texture.update(context, image, key, color, || late) {
+            panes.desk.unfinished = true;
+        }
+    }
+    panes.gallery.reference_texture = texture;
 }
 
 /// A number that differs when anything that decides a panel's colours differs.
@@ -292,7 +316,7 @@ fn navigate(panes: &mut Panes, ui: &mut Ui, index: usize, viewport: &Viewport, r
         return;
     }
     if response.dragged_by(egui::PointerButton::Primary) {
-        let split = session.comparison.mode == Mode::Split && session.comparison.with.is_some();
+        let split = session.comparison.mode == Mode::Split;
         if split && let Some(at) = at {
             session.comparison.divider = ((at.x - viewport.image().left()) / viewport.image().width()).clamp(0.0, 1.0);
         } else {

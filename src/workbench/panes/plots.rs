@@ -51,7 +51,7 @@ pub(super) fn errors(panes: &mut Panes, ui: &mut Ui) {
         }
     });
     if panes.desk.reference.is_none() {
-        ui.weak("No reference is loaded. Built-in scenes bring one; drop an EXR, or name it in a session.");
+        ui.weak("No reference is loaded. Some built-in scenes bring one, which shows them unedited; File > Compare with a reference image takes an EXR or PNG.");
         return;
     }
     if panes.desk.untimed {
