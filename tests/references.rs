@@ -119,8 +119,8 @@ fn aimed_at_the_ball(scene: &mut Scene) {
 }
 
 /// The focus holds an eighth of the light on a few pixels, and the region of stray light very little: the three parts of
-/// the light are rendered alone and added up. A ninth of the stray light is global and came by some thousand photons in
-/// all, in footprints that a diffuse bounce has made large; they are made small, so that they take none from around.
+/// the light are rendered alone and added up. A ninth of the stray light is global, by some five hundred photons: what is
+/// left of the deviation is within their noise.
 #[test]
 fn glass_ball() {
     let regions = [
