@@ -2,6 +2,8 @@
 
 #![allow(clippy::expect_used, missing_docs, reason = "a failed expectation is how this program reports")]
 
+mod frames;
+
 use cusp::export::exr_file;
 use cusp::export::session::{Difference, Mode, Panel, Session};
 use cusp::measure::Reference;
@@ -10,28 +12,13 @@ use cusp::workbench::Workbench;
 use cusp::workbench::actions::Action;
 use cusp::workbench::document::Opened;
 use cusp::workbench::messages::Gravity;
+use frames::run_until;
 use std::path::Path;
 use std::process::Command;
-use std::time::{Duration, Instant};
 
 const SIZE: [u32; 2] = [64, 64];
 const CROP: Rect = Rect { x: 10, y: 20, width: 48, height: 32 };
 const ENLARGE: u32 = 4;
-
-/// Draws frames until `done`.
-fn run_until(workbench: &mut Workbench, context: &egui::Context, done: impl Fn(&Workbench) -> bool) {
-    let start = Instant::now();
-    while !done(workbench) {
-        assert!(
-            start.elapsed() < Duration::from_secs(120),
-            "it never ends; messages: {:?}",
-            workbench.messages().all()
-        );
-        let mut output = context.run_ui(egui::RawInput::default(), |ui| workbench.ui(ui));
-        output.textures_delta.clear();
-        std::thread::sleep(Duration::from_millis(2));
-    }
-}
 
 /// A window on `session` that has rendered all its passes.
 fn finished(context: &egui::Context, session: Session) -> Workbench {

@@ -2,6 +2,8 @@
 
 #![allow(clippy::expect_used, missing_docs, reason = "a failed expectation is how this program reports")]
 
+mod frames;
+
 use cusp::export::session::{Panel, Session};
 use cusp::math::rgb::mean;
 use cusp::measure::Reference;
@@ -10,6 +12,7 @@ use cusp::workbench::Workbench;
 use cusp::workbench::actions::Action;
 use cusp::workbench::document::Opened;
 use cusp::workbench::messages::Gravity;
+use frames::run_until;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -110,21 +113,6 @@ fn bad_sessions_are_refused_in_one_line() {
         assert_eq!(error.trim_end().lines().count(), 1, "{text}: {error}");
         assert!(error.contains(&format!("s.toml:{line}: ")) && error.contains(part), "{text}: {error}");
         assert!(run.stdout.is_empty() && !out.exists(), "{text}");
-    }
-}
-
-/// Draws frames until `done`.
-fn run_until(workbench: &mut Workbench, context: &egui::Context, done: impl Fn(&Workbench) -> bool) {
-    let start = Instant::now();
-    while !done(workbench) {
-        assert!(
-            start.elapsed() < Duration::from_secs(120),
-            "it never ends; messages: {:?}",
-            workbench.messages().all()
-        );
-        let mut output = context.run_ui(egui::RawInput::default(), |ui| workbench.ui(ui));
-        output.textures_delta.clear();
-        std::thread::sleep(Duration::from_millis(2));
     }
 }
 

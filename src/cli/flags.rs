@@ -132,14 +132,9 @@ impl CommonFlags {
     /// # Errors
     /// A number of threads that can't be, or what `work` returns.
     pub fn on_threads<T: Send>(&self, work: impl FnOnce() -> Result<T, Failure> + Send) -> Result<T, Failure> {
-        match self.threads {
+        match self.thread_pool()? {
             None => work(),
-            Some(n @ 1..=1024) => rayon::ThreadPoolBuilder::new()
-                .num_threads(n)
-                .build()
-                .map_err(|e| Failure::Work(format!("--threads {n}: {e}")))?
-                .install(work),
-            Some(n) => Err(Failure::Call(format!("--threads: must lie in 1 to 1024, got {n}"))),
+            Some((n, pool)) => pool.build().map_err(|e| Failure::Work(format!("--threads {n}: {e}")))?.install(work),
         }
     }
 
@@ -148,12 +143,17 @@ impl CommonFlags {
     /// # Errors
     /// A number of threads that can't be.
     pub fn set_threads(&self) -> Result<(), Failure> {
-        match self.threads {
+        match self.thread_pool()? {
             None => Ok(()),
-            Some(n @ 1..=1024) => rayon::ThreadPoolBuilder::new()
-                .num_threads(n)
-                .build_global()
-                .map_err(|e| Failure::Work(format!("--threads {n}: {e}"))),
+            Some((n, pool)) => pool.build_global().map_err(|e| Failure::Work(format!("--threads {n}: {e}"))),
+        }
+    }
+
+    /// The number of threads that was asked for, with a pool of so many to be built.
+    fn thread_pool(&self) -> Result<Option<(usize, rayon::ThreadPoolBuilder)>, Failure> {
+        match self.threads {
+            None => Ok(None),
+            Some(n @ 1..=1024) => Ok(Some((n, rayon::ThreadPoolBuilder::new().num_threads(n)))),
             Some(n) => Err(Failure::Call(format!("--threads: must lie in 1 to 1024, got {n}"))),
         }
     }

@@ -20,6 +20,8 @@ pub struct Construction {
     pub covered: Vec<Vec3>,
     /// That part's area over the view footprint's, in `[0, 1]`; 0 without such a part.
     pub coverage: f64,
+    /// Centroid of that part, where the kernel is evaluated as published (Pedersen 2011, eq. 66), metres; None without it.
+    pub centroid: Option<Vec3>,
 }
 
 impl Construction {

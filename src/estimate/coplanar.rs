@@ -185,6 +185,7 @@ impl Estimator for Coplanar {
             Weight::Centroid => vec![SamplingPoint { position, inside }],
             Weight::Mean => Vec::new(),
         };
-        Construction { points, covered: polygon.vertices().iter().map(|v| at(v.parameter)).collect(), coverage }
+        let covered = polygon.vertices().iter().map(|v| at(v.parameter)).collect();
+        Construction { points, covered, coverage, centroid: Some(position) }
     }
 }

@@ -90,6 +90,11 @@ impl Pass {
 
     /// Factor on the axes of the photons' footprints in this pass's maps.
     pub fn scale(&self) -> f32 {
-        (f64::from(self.settings.footprint_scale) * self.area_factor.sqrt()) as f32
+        scale_of(&self.settings, self.area_factor)
     }
+}
+
+/// Factor on the axes of footprints whose area is `area_factor` of the first pass's.
+pub(super) fn scale_of(settings: &RenderSettings, area_factor: f64) -> f32 {
+    (f64::from(settings.footprint_scale) * area_factor.sqrt()) as f32
 }

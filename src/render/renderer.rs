@@ -3,7 +3,7 @@
 use crate::estimate::{Estimator, Lookup};
 use crate::render::change::{PhotonStore, World, film_is_kept, photons_are_kept};
 use crate::render::film::{Film, Rect};
-use crate::render::pass::Pass;
+use crate::render::pass::{Pass, scale_of};
 use crate::render::photon_pass::{Emitter, PhotonMaps, PhotonPass};
 use crate::render::plan::{Pilot, Plan, Slot};
 use crate::render::settings::{Gather, PlanMode, RenderSettings};
@@ -293,8 +293,7 @@ impl Renderer {
         number: u32,
         area_factor: f64,
     ) -> Arc<Pass> {
-        let scale = (f64::from(settings.footprint_scale) * area_factor.sqrt()) as f32;
-        let maps = PhotonMaps::new(&self.scene, &plan, &photons.stored, scale);
+        let maps = PhotonMaps::new(&self.scene, &plan, &photons.stored, scale_of(&settings, area_factor));
         let (scene, intersector) = (Arc::clone(&self.scene), Arc::clone(&self.intersector));
         Arc::new(Pass { scene, intersector, settings, plan, photons, maps, number, area_factor })
     }

@@ -17,9 +17,7 @@ pub struct Areas {
 impl Areas {
     /// Of the photons of a pass, as its maps hold them.
     pub fn of(pass: &Pass) -> Self {
-        let maps = &pass.maps;
-        let kinds = [("direct", &maps.direct), ("caustic", &maps.caustic), ("global", &maps.global)];
-        let kinds = kinds.into_iter().filter_map(|(name, map)| Some((name, bins(map.as_ref()?)))).collect();
+        let kinds = pass.maps.by_kind().map(|(kind, map)| (kind.name(), bins(map))).collect();
         Self { kinds }
     }
 }

@@ -37,13 +37,7 @@ impl Chart {
 
     /// The ellipse with half-axes `a` and `b` about `center`, as a polygon.
     pub fn ellipse(&self, center: Vec3, a: Vec3, b: Vec3) -> Vec<Pos2> {
-        let turn = std::f32::consts::TAU / SIDES as f32;
-        (0..SIDES)
-            .map(|i| {
-                let angle = i as f32 * turn;
-                self.to_screen(center + a * libm::cosf(angle) + b * libm::sinf(angle))
-            })
-            .collect()
+        ellipse_points(center, [a, b], SIDES).map(|p| self.to_screen(p)).collect()
     }
 
     /// Metres for each point of the screen.
@@ -123,6 +117,15 @@ pub fn show(ui: &mut Ui, inspector: &mut Inspector, found: &Inspected, height: f
     }
 }
 
+/// Points around the ellipse with half-axes `a` and `b` about `center`, evenly in its parameter, metres.
+pub fn ellipse_points(center: Vec3, [a, b]: [Vec3; 2], sides: usize) -> impl Iterator<Item = Vec3> {
+    let turn = std::f32::consts::TAU / sides as f32;
+    (0..sides).map(move |i| {
+        let angle = i as f32 * turn;
+        center + a * libm::cosf(angle) + b * libm::sinf(angle)
+    })
+}
+
 /// Corners of a view footprint.
 pub fn corners(center: Vec3, [a, b]: [Vec3; 2]) -> [Vec3; 4] {
     [center - a - b, center + a - b, center + a + b, center - a + b]
@@ -150,8 +153,9 @@ fn construction(painter: &egui::Painter, chart: &Chart, found: &Inspected, row: 
         let polygon: Vec<Pos2> = c.covered.iter().map(|p| chart.to_screen(*p)).collect();
         let color = Color32::from_rgb(230, 120, 200);
         painter.add(Shape::convex_polygon(polygon, color.gamma_multiply(0.25), Stroke::new(1.0, color)));
-        let centroid = super::summary::centroid(&c.covered);
-        painter.circle_stroke(chart.to_screen(centroid), 3.0, Stroke::new(1.5, color));
+        if let Some(centroid) = c.centroid {
+            painter.circle_stroke(chart.to_screen(centroid), 3.0, Stroke::new(1.5, color));
+        }
     }
     for p in &c.points {
         let color = if p.inside { Color32::from_rgb(90, 220, 110) } else { Color32::from_rgb(240, 90, 80) };

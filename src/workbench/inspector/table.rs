@@ -1,6 +1,6 @@
 //! The photons of the inspected pixel as a table.
 
-use super::summary::{kind_name, situation_name, situation_tip};
+use super::summary::situation_tip;
 use super::{Column, Inspected, Inspector};
 use crate::math::rgb::mean;
 use crate::render::inspect::PhotonRow;
@@ -93,7 +93,7 @@ fn row(ui: &mut Ui, inspector: &mut Inspector, row: &PhotonRow, index: usize, co
     let width: f32 = columns.iter().map(|c| c.2).sum();
     let (rect, response) = ui.allocate_exact_size(vec2(width, ROW + 3.0), Sense::click());
     response.widget_info(|| {
-        egui::WidgetInfo::labeled(egui::Role::Button, true, format!("photon {} {}", kind_name(row.kind), row.index))
+        egui::WidgetInfo::labeled(egui::Role::Button, true, format!("photon {} {}", row.kind.name(), row.index))
     });
     if response.hovered() {
         inspector.hovered = Some(index);
@@ -109,11 +109,11 @@ fn row(ui: &mut Ui, inspector: &mut Inspector, row: &PhotonRow, index: usize, co
     let mut left = rect.left();
     for (column, _, width, _) in columns {
         let text = match column {
-            Column::Photon => format!("{} {}", kind_name(row.kind), row.index),
+            Column::Photon => format!("{} {}", row.kind.name(), row.index),
             Column::Power => number(f64::from(mean(row.power))),
             Column::Area => number(f64::from(row.area)),
             Column::Distance => number(f64::from(row.distance)),
-            Column::Situation => situation_name(row.situation).into(),
+            Column::Situation => row.situation.letter().into(),
             Column::Weight(e) => number(row.weights.get(*e).copied().unwrap_or(0.0)),
         };
         let cell = Rect::from_min_size(pos2(left, rect.top()), vec2(*width - 4.0, rect.height()));

@@ -34,14 +34,9 @@ pub struct VisiblePhotons {
 impl VisiblePhotons {
     /// Those of a pass, as its camera sees them.
     pub fn of(pass: &Pass) -> Self {
-        let maps = [
-            (PhotonKind::Direct, &pass.maps.direct),
-            (PhotonKind::Caustic, &pass.maps.caustic),
-            (PhotonKind::Global, &pass.maps.global),
-        ];
         let mut chosen: Vec<(u64, PhotonKind, &MapPhoton)> = Vec::new();
-        for (kind, map) in maps {
-            let photons = map.as_ref().map_or(&[][..], |m| m.photons());
+        for (kind, map) in pass.maps.by_kind() {
+            let photons = map.photons();
             // Numbers that have nothing to do with a place make any first part an even sample.
             chosen.extend(photons.iter().enumerate().map(|(i, p)| (mix(kind as u64, i as u64), kind, p)));
         }

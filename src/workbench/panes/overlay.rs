@@ -3,8 +3,7 @@
 use super::Panes;
 use crate::photons::PhotonKind;
 use crate::render::inspect::view_path;
-use crate::workbench::inspector::plane::{corners, kind_color};
-use crate::workbench::inspector::summary::centroid;
+use crate::workbench::inspector::plane::{corners, ellipse_points, kind_color};
 use crate::workbench::theme::number;
 use crate::workbench::viewport::Viewport;
 use egui::{Align2, Color32, FontId, Painter, Pos2, Rect, Shape, Stroke};
@@ -38,14 +37,8 @@ impl Projection<'_> {
         points.iter().map(|p| self.at(*p)).collect()
     }
 
-    fn ellipse(&self, center: Vec3, [a, b]: [Vec3; 2]) -> Option<Vec<Pos2>> {
-        let turn = std::f32::consts::TAU / SIDES as f32;
-        (0..SIDES)
-            .map(|i| {
-                let angle = i as f32 * turn;
-                self.at(center + a * libm::cosf(angle) + b * libm::sinf(angle))
-            })
-            .collect()
+    fn ellipse(&self, center: Vec3, axes: [Vec3; 2]) -> Option<Vec<Pos2>> {
+        ellipse_points(center, axes, SIDES).map(|p| self.at(p)).collect()
     }
 }
 
@@ -127,7 +120,7 @@ fn polygons(projection: &Projection, painter: &Painter) {
             let lit = inspector.bright() == Some(row);
             let fill = if lit { PINK.gamma_multiply(0.4) } else { PINK.gamma_multiply(0.08) };
             painter.add(Shape::convex_polygon(polygon, fill, Stroke::new(if lit { 1.5 } else { 0.5 }, PINK)));
-            if let Some(at) = projection.at(centroid(&c.covered)) {
+            if let Some(at) = c.centroid.and_then(|p| projection.at(p)) {
                 painter.circle_stroke(at, if lit { 3.0 } else { 1.5 }, Stroke::new(1.0, PINK));
             }
         }
