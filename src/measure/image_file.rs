@@ -1,7 +1,7 @@
 //! Image files as linear images: EXR and PNG.
 
 use crate::math::rgb::Rgb;
-use crate::measure::Mask;
+use crate::measure::{Mask, exr_header};
 use crate::render::film::Image;
 use crate::scene::texture::srgb_to_linear;
 use image::{ColorType, DynamicImage, ImageFormat};
@@ -26,6 +26,15 @@ pub struct ReadError {
 /// A file that is missing, is of another kind or is damaged, or a pixel that is not finite.
 pub fn read(path: &Path) -> Result<Image, ReadError> {
     bytes_of(path).and_then(|bytes| decode(&bytes)).map_err(|why| ReadError { path: path.to_owned(), why })
+}
+
+/// As [`read`], with the facts that Cusp writes into the header of an EXR file; a PNG has none.
+///
+/// # Errors
+/// As for [`read`].
+pub fn read_with_facts(path: &Path) -> Result<(Image, Vec<(String, String)>), ReadError> {
+    let both = bytes_of(path).and_then(|bytes| Ok((decode(&bytes)?, exr_header::facts(&bytes))));
+    both.map_err(|why| ReadError { path: path.to_owned(), why })
 }
 
 /// Reads a mask: pixels of 50 % grey and brighter count.

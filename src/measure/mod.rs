@@ -1,6 +1,7 @@
 //! Error metrics and the references that they are taken against.
 
 pub mod difference;
+pub mod exr_header;
 pub mod flip;
 pub mod image_file;
 pub mod metrics;
@@ -10,4 +11,4 @@ pub mod window;
 
 pub use difference::Difference;
 pub use metrics::{ErrorMetrics, Mask};
-pub use reference::Reference;
+pub use reference::{Noise, Reference};
