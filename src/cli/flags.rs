@@ -1,6 +1,7 @@
 //! Flags that several commands share.
 
 use crate::cli::failure::Failure;
+use crate::measure::study::sweep::whole_number;
 use crate::render::film::Rect;
 use crate::render::settings::{PlanMode, RenderSettings};
 use crate::scene::Scene;
@@ -161,13 +162,7 @@ impl CommonFlags {
 
 /// A whole number, as in `200000` or `2e5`.
 fn count(text: &str) -> Result<i64, String> {
-    if let Ok(n) = text.parse() {
-        return Ok(n);
-    }
-    match text.parse::<f64>() {
-        Ok(x) if x.fract() == 0.0 && x.abs() < 1e15 => Ok(x as i64),
-        _ => Err("not a whole number".into()),
-    }
+    whole_number(text).ok_or_else(|| "not a whole number".into())
 }
 
 /// `WxH`.

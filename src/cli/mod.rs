@@ -12,6 +12,7 @@ pub mod lists;
 pub mod progress;
 pub mod render;
 pub mod shot;
+pub mod study;
 pub mod table;
 pub mod window;
 
@@ -43,6 +44,10 @@ enum Command {
     Inspect(inspect::InspectArgs),
     /// Every metric of an image against another, and the difference image
     Diff(diff::DiffArgs),
+    /// Error against run time: study.csv, study.json, study.png
+    Study(study::StudyArgs),
+    /// The shards of a study as one
+    Merge(study::merge::MergeArgs),
     /// The workbench drawn to a file, without a window
     Shot(shot::ShotArgs),
     /// The built-in scenes
@@ -71,6 +76,8 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
         Some(Command::Render(args)) => render::run(&args),
         Some(Command::Inspect(args)) => inspect::run(&args),
         Some(Command::Diff(args)) => diff::run(&args),
+        Some(Command::Study(args)) => study::run(&args),
+        Some(Command::Merge(args)) => study::merge::run(&args),
         Some(Command::Shot(args)) => shot::run(&args),
         Some(Command::Scenes(args)) => lists::scenes(&args),
         Some(Command::Estimators(args)) => lists::estimators(&args),

@@ -124,34 +124,133 @@ pub fn mean_over_parallelogram(c: Vec3, a: Vec3, b: Vec3) -> f64 {
     if cc > 1.0 && (cc - 1.0 - spread).max(0.0).powi(2) > 4.0 * spread {
         return 0.0;
     }
-    if spread < 1.0 && cc < 1.0 + spread - 2.0 * spread.sqrt() {
-        return mean_inside(cc, c.dot(a), c.dot(b), aa, bb, a.dot(b));
+    let (ca, cb, ab) = (c.dot(a), c.dot(b), a.dot(b));
+    let farthest = cc + aa + bb + 2.0 * (ab + (ca + cb).abs()).max((ca - cb).abs() - ab);
+    if farthest <= 1.0 {
+        return mean_inside(cc, ca, cb, aa, bb, ab);
     }
-    let length = aa.sqrt();
-    if length < SHORT {
+    if aa < SHORT * SHORT {
         return (1.0 - cc).max(0.0).powi(2);
     }
-    let e1 = a / length;
-    let along = b.dot(e1);
-    let across = b - e1 * along;
-    let width = across.length();
-    let x = c.dot(e1);
-    if width < THIN {
-        return mean_over_segment(x, (c - e1 * x).length_squared(), length, along.abs());
+    let normal = a.cross(b);
+    let area2 = normal.length_squared();
+    if area2 < THIN * THIN * aa {
+        let length = aa.sqrt();
+        let e1 = a / length;
+        let x = c.dot(e1);
+        return mean_over_segment(x, (c - e1 * x).length_squared(), length, b.dot(e1).abs());
     }
-    let e2 = across / width;
-    let y = c.dot(e2);
-    let off = (c - e1 * x - e2 * y).length_squared();
-    let rho2 = 1.0 - off;
+    let area = area2.sqrt();
+    let normal = normal * (1.0 / area);
+    let off = c.dot(normal);
+    let rho2 = 1.0 - off * off;
     if rho2 <= 0.0 {
         return 0.0;
     }
-    let scale = 1.0 / rho2.sqrt();
-    let center = DVec2::new(x, y) * scale;
-    let u = DVec2::new(length * scale, 0.0);
-    let v = DVec2::new(along, width) * scale;
-    let integral = integral_over_polygon(&[center - u - v, center + u - v, center + u + v, center - u + v]);
-    (rho2 * rho2 * integral / (4.0 * u.x * v.y)).min(1.0)
+    let frame = Frame { aa, bb, ab, ca, cb, area, cxa: c.cross(a).dot(normal), cxb: c.cross(b).dot(normal) };
+    (frame.integral(cc - off * off, rho2) * rho2.powi(3) / (4.0 * area)).clamp(0.0, 1.0)
+}
+
+/// A parallelogram by the products of its centre `c` and half-edges `a`, `b` in its own plane.
+struct Frame {
+    aa: f64,
+    bb: f64,
+    ab: f64,
+    ca: f64,
+    cb: f64,
+    /// `a × b`, positive.
+    area: f64,
+    /// `c × a`.
+    cxa: f64,
+    /// `c × b`.
+    cxb: f64,
+}
+
+/// Angles nearer to none or to a full turn than this are told apart by what lies inside the disc.
+const CLOSE: f64 = 1e-9;
+/// Integral along the edges below which nearly nothing of them lies inside: a polygon as wide as [`THIN`] that reaches
+/// from the centre to the circle has more, chords that cut off an angle of [`CLOSE`] have less.
+const HAIR: f64 = 1e-7;
+
+impl Frame {
+    /// Integral of `(1 - u)²` over the part inside the disc of squared radius `rho2`, in units of that disc.
+    ///
+    /// * `cc`: squared length of the centre.
+    ///
+    /// As [`integral_over_polygon`], but for four edges that come in pairs. The outside parts add up to the arcs of the
+    /// circle inside the polygon, whose angle lies in [0, 2π]; each run outside is known by the points where it leaves
+    /// and enters the disc, which are multiplied as complex numbers.
+    #[inline]
+    fn integral(&self, cc: f64, rho2: f64) -> f64 {
+        let Self { aa, bb, ab, ca, cb, area, cxa, cxb } = *self;
+        let (per_aa, per_bb, per_rho2) = (1.0 / aa, 1.0 / bb, 1.0 / rho2);
+        // Squared length of the vertices: c - a - b, c + a - b, c + a + b, c - a + b.
+        let all = cc + aa + bb;
+        let (sum, difference) = (2.0 * (ca + cb), 2.0 * (ca - cb));
+        let inside = [
+            all + 2.0 * ab - sum < rho2,
+            all - 2.0 * ab + difference < rho2,
+            all + 2.0 * ab + sum < rho2,
+            all - 2.0 * ab - difference < rho2,
+        ];
+        // For each edge m + s e, -1 <= s <= 1: m × e, m · e, e · e and its inverse.
+        let edges = [
+            (cxa + area, ca - ab, aa, per_aa),
+            (cxb + area, cb + ab, bb, per_bb),
+            (area - cxa, -(ca + ab), aa, per_aa),
+            (area - cxb, ab - cb, bb, per_bb),
+        ];
+        // The point at s, turned by the same angle for all edges: ((m + s e) · a, a × (m + s e)).
+        let points = [
+            (ca - ab, aa, -cxa - area, 0.0),
+            (ca + aa, ab, -cxa, area),
+            (ca + ab, -aa, area - cxa, 0.0),
+            (ca - aa, -ab, -cxa, -area),
+        ];
+        let mut inner = 0.0;
+        let mut turn = DVec2::X;
+        for k in 0..4 {
+            let (cross, dot, ee, per_ee) = edges[k];
+            let (from_inside, to_inside) = (inside[k], inside[(k + 1) % 4]);
+            let height2 = cross * cross * per_ee;
+            let nearest = -dot * per_ee;
+            let half2 = (rho2 - height2) * per_ee;
+            if !from_inside && !to_inside && (half2 <= 0.0 || nearest.abs() >= 1.0) {
+                continue;
+            }
+            let half = half2.max(0.0).sqrt();
+            let from = if from_inside { -1.0 } else { (nearest - half).clamp(-1.0, 1.0) };
+            let to = if to_inside { 1.0 } else { (nearest + half).clamp(-1.0, 1.0) };
+            let (middle, radius) = ((from + to) / 2.0 - nearest, (to - from) / 2.0);
+            // ∫ 3 - 3u + u² with u = h + e x²: moments of x about 0 over [middle - radius, middle + radius].
+            let (h, e) = (height2 * per_rho2, ee * per_rho2);
+            let (m2, r2) = (middle * middle, radius * radius);
+            let second = e * (m2 + r2 / 3.0);
+            let fourth = e * e * (m2 * m2 + 2.0 * m2 * r2 + r2 * r2 / 5.0);
+            let mean = (3.0 - 3.0 * h + h * h) + (2.0 * h - 3.0) * second + fourth;
+            inner += cross * (to - from) * mean;
+            let (px, qx, py, qy) = points[k];
+            let at = |s: f64| DVec2::new(px + s * qx, py + s * qy);
+            if !from_inside {
+                turn = turn.rotate(at(from));
+            }
+            if !to_inside {
+                let p = at(to);
+                turn = turn.rotate(DVec2::new(p.x, -p.y));
+            }
+        }
+        let inner = inner * per_rho2 / 6.0;
+        let mut arcs = libm::atan2(turn.y, turn.x);
+        if arcs.abs() <= CLOSE {
+            // Either the polygon leaves out a hair of the circle, and nearly nothing of its edges lies inside; or it
+            // reaches out of the disc by a hair.
+            let holds = edges.iter().all(|e| e.0 >= 0.0) && inner < HAIR;
+            arcs = if holds { TAU + arcs.min(0.0) } else { arcs.max(0.0) };
+        } else if arcs < 0.0 {
+            arcs += TAU;
+        }
+        (inner + arcs / 6.0).clamp(0.0, PI / 3.0)
+    }
 }
 
 /// The mean where the whole parallelogram lies inside the ball: a polynomial in the dot products.
@@ -271,6 +370,61 @@ mod tests {
             };
             let (p, q) = (integral_over_polygon(&at(0.0)), integral_over_polygon(&at(shift)));
             prop_assert!((p - q).abs() < 1e-7);
+        }
+    }
+
+    /// Four edges in pairs are the general polygon, wherever vertices and edges lie to the circle.
+    fn general(c: DVec2, a: DVec2, b: DVec2) -> f64 {
+        integral_over_polygon(&[c - a - b, c + a - b, c + a + b, c - a + b]) / (4.0 * a.perp_dot(b).abs())
+    }
+
+    fn flat(v: DVec2) -> Vec3 {
+        v.extend(0.0).as_vec3()
+    }
+
+    proptest! {
+        #[test]
+        fn pairs_of_edges_equal_the_general_polygon(
+            phi in 0.0f64..TAU, psi in 0.05f64..3.0, p in -3.0f64..3.0, q in -3.0f64..3.0, radius in 0.0f64..3.0, at in 0.0f64..TAU,
+        ) {
+            let axis = |angle: f64, size: f64| flat(DVec2::from_angle(angle) * 10f64.powf(size));
+            let (a, b, c) = (axis(phi, p), axis(phi + psi, q), flat(DVec2::from_angle(at) * radius));
+            let plane = |v: Vec3| v.truncate().as_dvec2();
+            let expected = general(plane(c), plane(a), plane(b));
+            let mean = mean_over_parallelogram(c, a, b);
+            prop_assert!((mean - expected).abs() < 1e-9 + 1e-6 * expected, "{mean} {expected}");
+        }
+
+        /// A vertex or an edge on the circle, or a hair inside or outside it.
+        #[test]
+        fn touching_the_circle_does_not_matter(
+            phi in 0.0f64..TAU, s in 0.01f64..3.0, t in 0.01f64..3.0, hair in -1i32..2, kind in 0usize..3,
+        ) {
+            let (x, y) = (DVec2::from_angle(phi), DVec2::from_angle(phi).perp());
+            let (a, b) = (x * s, y * t);
+            let reach = 1.0 + f64::from(hair) * 1e-7;
+            let c = match kind {
+                // The middle of an edge from outside, the same edge from inside, a vertex.
+                0 => x * (reach + s),
+                1 => x * (reach - s),
+                _ => (x + y).normalize() * reach + a + b,
+            };
+            let mean = mean_over_parallelogram(flat(c), flat(a), flat(b));
+            let n = 300;
+            let grid = brute(flat(c).as_dvec3(), flat(a).as_dvec3(), flat(b).as_dvec3(), n);
+            prop_assert!((mean - grid).abs() < 1e-3, "{mean} {grid}");
+        }
+    }
+
+    #[test]
+    fn a_disc_that_fits_the_square_is_whole() {
+        // All four edges touch the circle, just cut it, or just miss it.
+        for r in [1.0f32, 1.0 - 1e-7, 1.0 + 1e-7, 0.999_999, 1.000_001] {
+            for turn in 0..40 {
+                let x = DVec2::from_angle(f64::from(turn) * 0.157_3);
+                let mean = mean_over_parallelogram(Vec3::ZERO, flat(x) * r, flat(x.perp()) * r);
+                assert!((mean * 4.0 * f64::from(r * r) / (PI / 3.0) - 1.0).abs() < 1e-5, "{r} {turn} {mean}");
+            }
         }
     }
 

@@ -86,6 +86,21 @@ pub fn estimator(text: &str) -> Result<Box<dyn Estimator>, SpecError> {
     }
 }
 
+/// The estimator `text` with the setting `key` at `value`, as in `n` at `4`; None if it takes no such setting.
+///
+/// # Errors
+/// As [`estimator`].
+pub fn with_setting(text: &str, key: &str, value: &str) -> Result<Option<Box<dyn Estimator>>, SpecError> {
+    let spec = Spec::parse(text)?;
+    let takes = |e: &Entry| e.settings.split(", ").any(|s| s.split('=').next() == Some(key));
+    if !ESTIMATORS.iter().any(|e| e.id == spec.id && takes(e)) {
+        return estimator(text).map(|_| None);
+    }
+    let others = spec.pairs().filter(|(k, _)| *k != key).map(|(k, v)| format!("{k}={v}"));
+    let settings: Vec<String> = others.chain([format!("{key}={value}")]).collect();
+    estimator(&format!("{}:{}", spec.id, settings.join(","))).map(Some)
+}
+
 /// A list as in `regular,multi_sampled:n=8,grid=cells,integrated`: a part without a name that is known belongs to the
 /// estimator before it.
 ///
@@ -140,6 +155,16 @@ mod tests {
         ] {
             assert_eq!(estimator(text).map(|e| e.name()).expect(text), text);
         }
+    }
+
+    #[test]
+    fn a_setting_is_set_where_it_is_known() {
+        let with = |text, key, value| with_setting(text, key, value).map(|e| e.map(|e| e.name()));
+        let known = with("multi_sampled:n=8,grid=cells", "n", "4").expect("valid");
+        assert_eq!(known.as_deref(), Some("multi_sampled:n=4,grid=cells"));
+        assert_eq!(with("regular_3x3", "n", "5").expect("valid").as_deref(), Some("regular_3x3:n=5"));
+        assert_eq!(with("integrated", "n", "4"), Ok(None));
+        assert!(with("multi_sampled", "n", "1").is_err() && with("sharp", "n", "2").is_err());
     }
 
     #[test]

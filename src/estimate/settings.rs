@@ -41,6 +41,11 @@ impl<'a> Spec<'a> {
         Ok(spec)
     }
 
+    /// All settings as they were given.
+    pub fn pairs(&self) -> impl Iterator<Item = (&'a str, &'a str)> {
+        self.pairs.iter().copied()
+    }
+
     /// An error about this text.
     pub fn error(&self, what: impl Into<String>) -> SpecError {
         SpecError { text: self.text.to_owned(), what: what.into() }

@@ -8,7 +8,7 @@ use crate::scene::scene_file::RenderFile;
 use serde::{Deserialize, Serialize};
 
 /// How photons are looked up.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Gather {
     /// The k nearest of each map, as published.
@@ -18,7 +18,7 @@ pub enum Gather {
 }
 
 /// Which light an image shows.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum LightPart {
     /// Everything.
@@ -32,7 +32,7 @@ pub enum LightPart {
 }
 
 /// Where direct light comes from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum DirectLight {
     /// Shadow rays.
@@ -53,7 +53,7 @@ pub enum PlanMode {
 }
 
 /// Everything that decides an image, but the scene and the estimators.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RenderSettings {
     /// Photons emitted per pass, at least 1.
     pub photons: u64,

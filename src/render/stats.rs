@@ -1,10 +1,10 @@
 //! What a render cost: seconds of its parts, photons, memory, and counts of what was bounded.
 
 use crate::photons::path::PathCounts;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// Wall seconds of a render's parts. Inside a view pass, sums over threads scaled to the pass's wall time.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Seconds {
     /// Reading the scene.
     pub load: f64,
@@ -22,12 +22,31 @@ pub struct Seconds {
     pub gather: f64,
     /// Evaluating estimators.
     pub estimate: f64,
-    /// From start to end.
+    /// What is left of the total: reading flags, films, files.
+    pub other: f64,
+    /// From start to end: the sum of all of these.
     pub total: f64,
 }
 
+impl Seconds {
+    /// The same parts with that total; what they leave of it is `other`.
+    pub fn of_total(self, total: f64) -> Self {
+        let parts = [
+            self.load,
+            self.bvh,
+            self.plan,
+            self.photon_trace,
+            self.map_build,
+            self.view_trace,
+            self.gather,
+            self.estimate,
+        ];
+        Self { other: total - parts.iter().sum::<f64>(), total, ..self }
+    }
+}
+
 /// Photons stored, by kind.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct StoredCounts {
     /// Straight from a light.
     pub direct: u64,
