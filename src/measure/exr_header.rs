@@ -11,7 +11,7 @@ pub fn facts(exr: &[u8]) -> Vec<(String, String)> {
     let Ok(meta) = MetaData::read_from_buffered(exr, false) else {
         return Vec::new();
     };
-    let own = meta.headers.iter().flat_map(|h| &h.own_attributes.other).find(|(k, _)| k.to_string() == ATTRIBUTE);
+    let own = meta.headers.iter().flat_map(|h| &h.own_attributes.other).find(|(k, _)| **k == *ATTRIBUTE);
     match own {
         Some((_, AttributeValue::Text(text))) => text
             .to_string()

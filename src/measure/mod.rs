@@ -7,6 +7,7 @@ pub mod image_file;
 pub mod metrics;
 pub mod reference;
 pub mod study;
+pub mod tracer;
 pub mod trimmed;
 pub mod window;
 

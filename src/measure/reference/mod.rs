@@ -1,5 +1,7 @@
 //! Reference images: those of the binary, those that a user gives, and how far they are from the truth themselves.
 
+pub mod cache;
+pub mod closed_form;
 pub mod noise;
 
 pub use noise::Noise;
