@@ -82,6 +82,8 @@ const AXES: [u32; 2] = [620, 470];
 const HEADING: u32 = 58;
 const LINE: u32 = 20;
 const LEGEND: u32 = 330;
+/// Height of the heading of a pair of axes, pixels.
+const TITLE: u32 = 30;
 const FAMILY: &str = "cusp";
 
 /// Draws a plot.
@@ -97,7 +99,9 @@ pub fn draw(plot: &Plot) -> Result<Canvas, String> {
     canvas.text(14, 36, width, 15.0, FAINT, Face::Proportional, &plot.subtitle);
     for (i, axes) in plot.axes.iter().enumerate() {
         let rgb = draw_axes(axes)?;
-        canvas.paste(AXES[0] * i as u32, HEADING, AXES, &rgb, 1);
+        let x = AXES[0] * i as u32;
+        canvas.paste(x, HEADING, AXES, &rgb, 1);
+        canvas.text(x + 84, HEADING + 6, AXES[0] - 90, 17.0, INK, Face::Proportional, &axes.title);
     }
     if let Some(first) = plot.axes.first() {
         legend(&mut canvas, AXES[0] * plot.axes.len() as u32 + 8, first);
@@ -142,7 +146,8 @@ type Wrong<'a> = DrawingAreaErrorKind<<BitMapBackend<'a> as DrawingBackend>::Err
 fn paint<'a>(area: &Area<'a>, axes: &Axes, xs: Range<f64>, ys: Range<f64>) -> Result<(), Wrong<'a>> {
     let rgb = |c: [u8; 3]| RGBColor(c[0], c[1], c[2]);
     let mut chart = ChartBuilder::on(area)
-        .caption(&axes.title, (FAMILY, 17))
+        .margin_top(TITLE)
+        .margin_left(8)
         .margin_right(16)
         .x_label_area_size(46)
         .y_label_area_size(74)
@@ -154,7 +159,7 @@ fn paint<'a>(area: &Area<'a>, axes: &Axes, xs: Range<f64>, ys: Range<f64>) -> Re
         .label_style((FAMILY, 15))
         .axis_desc_style((FAMILY, 16))
         .bold_line_style(rgb([205; 3]))
-        .light_line_style(rgb([238; 3]))
+        .light_line_style(TRANSPARENT)
         .x_label_formatter(&|v| number(*v))
         .y_label_formatter(&|v| number(*v))
         .draw()?;

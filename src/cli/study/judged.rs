@@ -3,13 +3,13 @@
 use crate::cli::failure::Failure;
 use crate::cli::flags::rect;
 use crate::cli::study::judged_text::text;
+use crate::cli::study::own_reference;
 use crate::cli::study::truth::Given;
 use crate::cli::{print, to_json};
 use crate::export::study::report::ReferenceReport;
 use crate::export::study::{Store, StudyReport, picture};
 use crate::export::tone::auto_exposure;
 use crate::export::{plot, png_file, whole_file};
-use crate::measure::Reference;
 use crate::measure::study::study_plan::Task;
 use crate::measure::study::{Evaluation, Judge, StudyPlan, TaskRecord};
 use crate::render::film::{Image, Rect};
@@ -56,13 +56,13 @@ impl Study {
     pub fn judge(&self, flags: &JudgeFlags, given: Given, out: &Path, json: bool, quiet: bool) -> Result<(), Failure> {
         let reference = match given {
             Given::Reference(reference) => *reference,
-            Given::None => self.own_reference(flags, out, json || quiet)?,
+            Given::None => own_reference::make(self, flags, out, json || quiet)?,
         };
         let exposure = libm::log2f(auto_exposure(&reference.image));
         let judge = Judge::new(&reference, flags.crop, exposure).map_err(Failure::Call)?;
-        let records: Vec<TaskRecord> = self.records.iter().map(|r| r.0.clone()).collect();
-        let image = |task, passes| self.image(task, passes);
-        let evaluation = Evaluation::new(&self.plan, &records, &judge, &image).map_err(Failure::Work)?;
+        let records = self.task_records();
+        let evaluation =
+            Evaluation::new(&self.plan, &records, &judge, &|t, p| self.image(t, p)).map_err(Failure::Work)?;
         let facts = ReferenceReport::new(&reference, &judge);
         let report = StudyReport::new(&self.plan, &evaluation, facts, flags.crop, records.len());
         let whole = to_json(&report)?;
@@ -85,15 +85,20 @@ impl Study {
         }
     }
 
-    fn image(&self, task: Task, passes: u32) -> Result<Image, String> {
+    /// Its finished tasks.
+    pub fn task_records(&self) -> Vec<TaskRecord> {
+        self.records.iter().map(|r| r.0.clone()).collect()
+    }
+
+    /// The image of a task after so many passes.
+    ///
+    /// # Errors
+    /// A file that is missing or damaged.
+    pub fn image(&self, task: Task, passes: u32) -> Result<Image, String> {
         let of = |r: &TaskRecord| r.setting == task.setting && r.seed == task.seed;
         match self.records.iter().find(|(r, _)| of(r)) {
             Some((_, store)) => store.image(task, passes),
             None => Err(format!("task {} is not done", task.name())),
         }
-    }
-
-    fn own_reference(&self, _flags: &JudgeFlags, _out: &Path, _hidden: bool) -> Result<Reference, Failure> {
-        Err(Failure::Call("--reference: this scene has none of its own; give one".into()))
     }
 }

@@ -3,6 +3,7 @@
 pub mod judged;
 mod judged_text;
 pub mod merge;
+mod own_reference;
 mod truth;
 
 use crate::cli::failure::Failure;

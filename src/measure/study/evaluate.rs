@@ -135,8 +135,6 @@ pub struct Evaluation {
     pub curves: Vec<Curve>,
     /// Which setting is best for each budget of time.
     pub pareto: Vec<Best>,
-    /// Smallest mean squared error of any image without the reference's noise, (W/(m² sr))²; None without an image.
-    pub smallest_mse: Option<f64>,
 }
 
 impl Evaluation {
@@ -161,7 +159,6 @@ impl Evaluation {
             })
             .collect();
         let judged = judged?;
-        let smallest_mse = judged.iter().flatten().map(|g| g.smallest_mse).min_by(f64::total_cmp);
         let curves: Vec<Curve> = judged
             .into_iter()
             .zip(plan.settings.iter().zip(names))
@@ -183,15 +180,40 @@ impl Evaluation {
             })
             .collect();
         let pareto = best_of_budgets(&curves);
-        Ok(Self { curves, pareto, smallest_mse })
+        Ok(Self { curves, pareto })
     }
+}
+
+/// Smallest relative RMSE of any image of the tasks, the reference's noise taken out; None without an image. So good
+/// must a reference be, and better.
+///
+/// # Errors
+/// As [`Evaluation::new`].
+pub fn smallest_error(
+    records: &[TaskRecord],
+    judge: &Judge,
+    image: &(dyn Fn(Task, u32) -> Result<Image, String> + Sync),
+) -> Result<Option<f64>, String> {
+    let of = |r: &TaskRecord| {
+        let task = Task { setting: r.setting, seed: r.seed };
+        r.points.iter().map(move |p| (task, p.passes)).collect::<Vec<_>>()
+    };
+    let all: Vec<(Task, u32)> = records.iter().flat_map(of).collect();
+    let errors: Result<Vec<f64>, String> = all
+        .par_iter()
+        .map(|&(task, passes)| {
+            let fitted = judge.fitted(image(task, passes)?)?;
+            let mse = compare(&fitted, &judge.reference.image, &judge.mask)?.mse;
+            Ok(judge.relative(mse - judge.noise_mse.unwrap_or(0.0)))
+        })
+        .collect();
+    Ok(errors?.into_iter().min_by(f64::total_cmp))
 }
 
 /// All seeds of a setting at one checkpoint.
 struct Group {
     points: Vec<SeedPoint>,
     summary: Summary,
-    smallest_mse: f64,
 }
 
 impl Group {
@@ -239,8 +261,7 @@ impl Group {
             net_mse: told.then_some(mse - noise),
             bias_and_variance: judge.bias_and_variance(&images),
         };
-        let smallest = errors.iter().map(|e| (e.metrics.mse - noise).max(0.0)).fold(f64::INFINITY, f64::min);
-        Ok(Self { points, summary, smallest_mse: smallest })
+        Ok(Self { points, summary })
     }
 }
 
