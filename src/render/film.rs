@@ -1,20 +1,24 @@
 //! Images that grow pass by pass.
 
 use crate::math::rgb::Rgb;
+use crate::render::error_estimate::{ErrorEstimate, GroupSums};
 use glam::DVec3;
 
-/// Sum of the passes of an image, in f64 so that many passes stay accurate. Row 0 is the top.
+/// Sum of the passes of an image, in f64 so that many passes stay accurate, and what its error is estimated from. Row 0
+/// is the top.
 #[derive(Clone, Debug)]
 pub struct Film {
     size: [u32; 2],
     sum: Vec<DVec3>,
+    groups: GroupSums,
     passes: u32,
 }
 
 impl Film {
     /// A black film of `size` pixels.
     pub fn new(size: [u32; 2]) -> Self {
-        Self { size, sum: vec![DVec3::ZERO; size[0] as usize * size[1] as usize], passes: 0 }
+        let pixels = size[0] as usize * size[1] as usize;
+        Self { size, sum: vec![DVec3::ZERO; pixels], groups: GroupSums::new(pixels), passes: 0 }
     }
 
     /// Pixels across and down.
@@ -37,9 +41,10 @@ impl Film {
         }
     }
 
-    /// Counts a pass as finished.
-    pub fn finish_pass(&mut self) {
+    /// Counts a pass as finished whose footprints have `area` relative to the first, in `(0, 1]`.
+    pub fn finish_pass(&mut self, area: f64) {
         self.passes += 1;
+        self.groups.finish_pass(area, &self.sum);
     }
 
     /// The mean of the finished passes and one more, for the pixels of `rect` whose values in that pass are `pixels`.
@@ -54,6 +59,23 @@ impl Film {
             means.extend(sums.iter().zip(line).map(|(sum, p)| ((*sum + p.as_dvec3()) / n).as_vec3()));
         }
         means
+    }
+
+    /// Variance of [`Film::image`] by the noise of its photons and shadow rays, for each channel, (W/(m² sr))². None
+    /// below 12 passes.
+    ///
+    /// It comes from the scatter of groups of passes, so a pixel's own is a rough number below some hundred passes.
+    pub fn variance(&self) -> Option<Image> {
+        self.groups.variance(self.size)
+    }
+
+    /// Estimated error of [`Film::image`] over the pixels of `rect` that count, row by row of the whole image; all
+    /// without `counts`. None below 12 passes, and if no pixel counts.
+    ///
+    /// [`ErrorEstimate`] says what it does not see.
+    pub fn error_estimate(&self, rect: Rect, counts: Option<&[bool]>) -> Option<ErrorEstimate> {
+        let counted = |i: usize| counts.is_none_or(|c| c.get(i).copied().unwrap_or(false));
+        self.groups.error(&self.sum, self.size, rect.within(self.size), counted)
     }
 
     /// The mean of the finished passes, radiance in W/(m² sr).
@@ -174,7 +196,7 @@ mod tests {
         let mut film = Film::new([3, 2]);
         for value in [1.0, 3.0] {
             film.add_tile([1, 0], 2, &[Rgb::splat(value); 4]);
-            film.finish_pass();
+            film.finish_pass(1.0);
         }
         let image = film.image();
         assert_eq!(image.at(0, 0), Rgb::ZERO);

@@ -2,6 +2,7 @@
 
 pub mod change;
 pub mod direct;
+pub mod error_estimate;
 pub mod film;
 pub mod heatmap;
 pub mod inspect;
@@ -11,14 +12,17 @@ pub mod plan;
 pub mod renderer;
 pub mod settings;
 pub mod stats;
+pub mod stop;
 pub mod tiles;
 pub mod view;
 pub mod view_pass;
 pub mod watch;
 
+pub use error_estimate::ErrorEstimate;
 pub use film::Film;
 pub use pass::Pass;
 pub use plan::Plan;
 pub use renderer::{Renderer, Step};
 pub use settings::{Gather, LightPart, RenderSettings};
+pub use stop::{StopRule, StoppedBy};
 pub use watch::{Silent, Watch};

@@ -25,7 +25,7 @@ pub fn area_factor(pass: u32) -> f64 {
 }
 
 /// Area of the footprints of pass `pass` (from 1) after `area` in the pass before.
-fn next_area(area: f64, pass: u32) -> f64 {
+pub(super) fn next_area(area: f64, pass: u32) -> f64 {
     area * (f64::from(pass) + ALPHA) / (f64::from(pass) + 1.0)
 }
 
@@ -226,7 +226,7 @@ impl Renderer {
                 self.films[i].add_tile([tile.rect.x, tile.rect.y], tile.rect.width, &image.pixels);
             }
         }
-        now.iter().for_each(|&i| self.films[i].finish_pass());
+        now.iter().for_each(|&i| self.films[i].finish_pass(pass.area_factor));
         self.last = Some(pass);
         Step::Done
     }

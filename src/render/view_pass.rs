@@ -338,7 +338,7 @@ impl ViewPass<'_> {
 
 /// Cells along a pixel's side from which the view ray of a pass (from 0) is drawn: 1, then 2 up to pass 15, 4 up to
 /// pass 255, and so on. Powers of two, because so many Sobol points in a row visit each cell once.
-fn cells_of_pass(pass: u32) -> u32 {
+pub(super) fn cells_of_pass(pass: u32) -> u32 {
     let mut cells = 1;
     let mut next = 1;
     while u64::from(pass) >= next {
