@@ -142,7 +142,8 @@ fn a_scene_without_a_reference_gets_one() {
     assert!(noise > 0.0 && noise <= error * 1.5 && error < 0.3, "{noise} {error}");
 
     let out = folder.path().join("box");
-    let args = ["study", "two_lights", "--size", "24x24", "--estimators", "integrated", "--passes", "1", "--seeds", "1"];
+    let args =
+        ["study", "two_lights", "--size", "24x24", "--estimators", "integrated", "--passes", "1", "--seeds", "1"];
     let more = ["--photons", "2000", "--reference-seconds", "2", "--out", path(&out), "--json"];
     let study: Value = serde_json::from_str(&done(folder.path(), &[&args[..], &more].concat())).expect("JSON");
     let noise = study["reference"]["noise"].as_f64().expect("measured");

@@ -113,12 +113,8 @@ fn edge(p: DVec2, q: DVec2, outside: &mut AngleSum) -> f64 {
 /// Returns a value in `[0, 1]`. One axis vanishing, or parallel axes, give the mean over the segment, both the kernel
 /// at `c`.
 pub fn mean_over_parallelogram(c: Vec3, a: Vec3, b: Vec3) -> f64 {
-    let (c, mut a, mut b) = (c.as_dvec3(), a.as_dvec3(), b.as_dvec3());
-    let (mut aa, mut bb, cc) = (a.length_squared(), b.length_squared(), c.length_squared());
-    if bb > aa {
-        std::mem::swap(&mut a, &mut b);
-        std::mem::swap(&mut aa, &mut bb);
-    }
+    let (c, a, b) = (c.as_dvec3(), a.as_dvec3(), b.as_dvec3());
+    let (aa, bb, cc) = (a.length_squared(), b.length_squared(), c.length_squared());
     // No square root yet: |a| + |b| is at most √(2 (aa + bb)).
     let spread = 2.0 * (aa + bb);
     if cc > 1.0 && (cc - 1.0 - spread).max(0.0).powi(2) > 4.0 * spread {
@@ -129,16 +125,10 @@ pub fn mean_over_parallelogram(c: Vec3, a: Vec3, b: Vec3) -> f64 {
     if farthest <= 1.0 {
         return mean_inside(cc, ca, cb, aa, bb, ab);
     }
-    if aa < SHORT * SHORT {
-        return (1.0 - cc).max(0.0).powi(2);
-    }
     let normal = a.cross(b);
     let area2 = normal.length_squared();
-    if area2 < THIN * THIN * aa {
-        let length = aa.sqrt();
-        let e1 = a / length;
-        let x = c.dot(e1);
-        return mean_over_segment(x, (c - e1 * x).length_squared(), length, b.dot(e1).abs());
+    if area2 < THIN * THIN * aa.max(bb) || aa.max(bb) < SHORT * SHORT {
+        return if aa >= bb { mean_seen_edge_on(c, a, b) } else { mean_seen_edge_on(c, b, a) };
     }
     let area = area2.sqrt();
     let normal = normal * (1.0 / area);
@@ -183,6 +173,17 @@ impl Frame {
     #[inline]
     fn integral(&self, cc: f64, rho2: f64) -> f64 {
         let Self { aa, bb, ab, ca, cb, area, cxa, cxb } = *self;
+        // Each edge m + s e, -1 <= s <= 1, by m × e: its distance times its half-length, positive if the centre of the
+        // disc lies on the side of the polygon.
+        let crosses = [cxa + area, cxb + area, area - cxa, area - cxb];
+        let clear = |k: usize| crosses[k] * crosses[k] >= rho2 * if k % 2 == 0 { aa } else { bb };
+        let clear = [clear(0), clear(1), clear(2), clear(3)];
+        if (0..4).any(|k| clear[k] && crosses[k] < 0.0) {
+            return 0.0;
+        }
+        if clear == [true; 4] {
+            return PI / 3.0;
+        }
         let (per_aa, per_bb, per_rho2) = (1.0 / aa, 1.0 / bb, 1.0 / rho2);
         // Squared length of the vertices: c - a - b, c + a - b, c + a + b, c - a + b.
         let all = cc + aa + bb;
@@ -193,13 +194,8 @@ impl Frame {
             all + 2.0 * ab + sum < rho2,
             all - 2.0 * ab - difference < rho2,
         ];
-        // For each edge m + s e, -1 <= s <= 1: m × e, m · e, e · e and its inverse.
-        let edges = [
-            (cxa + area, ca - ab, aa, per_aa),
-            (cxb + area, cb + ab, bb, per_bb),
-            (area - cxa, -(ca + ab), aa, per_aa),
-            (area - cxb, ab - cb, bb, per_bb),
-        ];
+        // For each edge: m · e, e · e and its inverse.
+        let edges = [(ca - ab, aa, per_aa), (cb + ab, bb, per_bb), (-(ca + ab), aa, per_aa), (ab - cb, bb, per_bb)];
         // The point at s, turned by the same angle for all edges: ((m + s e) · a, a × (m + s e)).
         let points = [
             (ca - ab, aa, -cxa - area, 0.0),
@@ -210,7 +206,7 @@ impl Frame {
         let mut inner = 0.0;
         let mut turn = DVec2::X;
         for k in 0..4 {
-            let (cross, dot, ee, per_ee) = edges[k];
+            let (cross, (dot, ee, per_ee)) = (crosses[k], edges[k]);
             let (from_inside, to_inside) = (inside[k], inside[(k + 1) % 4]);
             let height2 = cross * cross * per_ee;
             let nearest = -dot * per_ee;
@@ -244,7 +240,7 @@ impl Frame {
         if arcs.abs() <= CLOSE {
             // Either the polygon leaves out a hair of the circle, and nearly nothing of its edges lies inside; or it
             // reaches out of the disc by a hair.
-            let holds = edges.iter().all(|e| e.0 >= 0.0) && inner < HAIR;
+            let holds = crosses.iter().all(|c| *c >= 0.0) && inner < HAIR;
             arcs = if holds { TAU + arcs.min(0.0) } else { arcs.max(0.0) };
         } else if arcs < 0.0 {
             arcs += TAU;
@@ -261,6 +257,17 @@ fn mean_inside(cc: f64, ca: f64, cb: f64, aa: f64, bb: f64, ab: f64) -> f64 {
         + (aa * aa + bb * bb) / 5.0
         + (4.0 * ab * ab + 2.0 * aa * bb) / 9.0;
     (1.0 - 2.0 * first + second).clamp(0.0, 1.0)
+}
+
+/// The mean over a parallelogram of no width, `a` its longer half-edge: over a segment, or at a point.
+fn mean_seen_edge_on(c: DVec3, a: DVec3, b: DVec3) -> f64 {
+    let length = a.length();
+    if length < SHORT {
+        return (1.0 - c.length_squared()).max(0.0).powi(2);
+    }
+    let e1 = a / length;
+    let x = c.dot(e1);
+    mean_over_segment(x, (c - e1 * x).length_squared(), length, b.dot(e1).abs())
 }
 
 /// Mean over points `x + s l + t w` of a line at squared distance `off` from the origin, `|s|, |t| ≤ 1`: the

@@ -91,6 +91,7 @@ struct Line {
 }
 
 impl GroupSums {
+    /// For so many pixels; none gives no estimate.
     pub fn new(pixels: usize) -> Self {
         Self { pixels: vec![Pixel::default(); pixels], totals: Totals::default() }
     }
@@ -128,7 +129,7 @@ impl GroupSums {
 
     fn line(&self) -> Option<Line> {
         let t = &self.totals;
-        if t.groups < LEAST_GROUPS {
+        if t.groups < LEAST_GROUPS || self.pixels.is_empty() {
             return None;
         }
         let (n, mean_r) = (f64::from(t.passes), t.wr / t.w);

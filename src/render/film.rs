@@ -21,6 +21,18 @@ impl Film {
         Self { size, sum: vec![DVec3::ZERO; pixels], groups: GroupSums::new(pixels), passes: 0 }
     }
 
+    /// A film that goes on from the sums of `passes` passes, one for each pixel, row by row; None if their number is
+    /// another. It has no error estimate, whose own sums are not among them.
+    pub fn going_on(size: [u32; 2], sum: Vec<DVec3>, passes: u32) -> Option<Self> {
+        let fits = sum.len() as u64 == u64::from(size[0]) * u64::from(size[1]);
+        fits.then(|| Self { size, sum, groups: GroupSums::new(0), passes })
+    }
+
+    /// The sum of the finished passes for each pixel, row by row, W/(m² sr).
+    pub fn sums(&self) -> &[DVec3] {
+        &self.sum
+    }
+
     /// Pixels across and down.
     pub fn size(&self) -> [u32; 2] {
         self.size

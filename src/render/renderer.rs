@@ -128,6 +128,21 @@ impl Renderer {
         self.photons = PhotonStore::of(bytes);
     }
 
+    /// Goes on from films that another renderer of the same scene, settings and estimators left, and from what it had
+    /// emitted, stored and spent. The next pass is the one after theirs. What was bounded is counted anew.
+    ///
+    /// False, and nothing is changed, if the films are of another number or size.
+    pub fn go_on(&mut self, films: Vec<Film>, emitted: u64, stored: StoredCounts, seconds: Seconds) -> bool {
+        let fits = films.len() == self.films.len() && films.iter().all(|f| f.size() == self.settings.size);
+        if fits {
+            self.films = films;
+            self.counted = self.passes();
+            (self.emitted, self.stored) = (emitted, stored);
+            self.seconds = Seconds { bvh: self.seconds.bvh, plan: self.seconds.plan, ..seconds };
+        }
+        fits
+    }
+
     /// Goes on with another scene, settings or estimators. What the change does not touch is kept: the hierarchy while
     /// the surfaces are the same, photons while what made them is, and the image of each estimator while nothing that
     /// it depends on has changed.

@@ -14,8 +14,9 @@ use crate::estimate::registry::{self, ESTIMATORS};
 use crate::export::names;
 use crate::export::study::Store;
 use crate::measure::study::study_plan::{Shard, Task};
-use crate::measure::study::{StudyPlan, Sweep, TaskRecord, task};
+use crate::measure::study::{Keep, StudyPlan, Sweep, TaskRecord, Unfinished, task};
 use crate::render::Watch;
+use crate::render::film::Image;
 use crate::render::settings::RenderSettings;
 use crate::scene::scene_file::RenderFile;
 use crate::scene::{Scene, open};
@@ -199,12 +200,8 @@ fn render(prepared: &Prepared, tasks: &[Task], resume: bool, hidden: bool) -> Re
             continue;
         }
         progress.set_message(format!("{}, seed {}", labels[task.setting], task.seed));
-        let facts = facts(plan, *task);
-        let kept = task::run(plan, scene, *task, &TaskWatch { bar: &progress }, |point, image| {
-            let mut facts = facts.clone();
-            facts.push(("cusp.passes", point.passes.to_string()));
-            store.write_image(*task, point.passes, image, &facts).map_err(Failure::from)
-        })?;
+        let mut keep = Keeper { store, task: *task, plan_hash: hash, facts: facts(plan, *task) };
+        let kept = task::run(plan, scene, *task, &TaskWatch { bar: &progress }, &mut keep)?;
         if let Some(record) = kept {
             store.write_record(&record)?;
             done.push(record);
@@ -213,6 +210,30 @@ fn render(prepared: &Prepared, tasks: &[Task], resume: bool, hidden: bool) -> Re
     }
     progress.finish_and_clear();
     Ok(done)
+}
+
+/// Keeps what a task makes in the study's folder.
+struct Keeper<'a> {
+    store: &'a Store,
+    task: Task,
+    plan_hash: u64,
+    facts: Vec<(&'static str, String)>,
+}
+
+impl Keep for Keeper<'_> {
+    type Error = Failure;
+
+    fn unfinished(&mut self) -> Option<Unfinished> {
+        self.store.unfinished(self.plan_hash, self.task)
+    }
+
+    fn keep(&mut self, image: &Image, so_far: &Unfinished) -> Result<(), Failure> {
+        let passes = so_far.points.last().map_or(0, |p| p.passes);
+        let mut facts = self.facts.clone();
+        facts.push(("cusp.passes", passes.to_string()));
+        self.store.write_image(self.task, passes, image, &facts)?;
+        Ok(self.store.write_unfinished(self.plan_hash, self.task, so_far)?)
+    }
 }
 
 /// What the images of a task carry.

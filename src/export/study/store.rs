@@ -4,14 +4,17 @@
 //! plan.json
 //! tasks/0003-1.json          setting 3, seed 1: written last, so what is there is whole
 //! tasks/0003-1/16.exr        its image after 16 passes
+//! tasks/0003-1/unfinished    what is needed to go on; gone when the task is finished
 //! ```
 
 use crate::export::exr_file;
 use crate::export::whole_file::{self, WriteError};
+use crate::math::hash::{FNV_START, fnv1a};
 use crate::measure::image_file;
 use crate::measure::study::study_plan::Task;
-use crate::measure::study::{StudyPlan, TaskRecord};
+use crate::measure::study::{StudyPlan, TaskRecord, Unfinished};
 use crate::render::film::Image;
+use glam::DVec3;
 use std::path::{Path, PathBuf};
 
 /// A study's folder.
@@ -80,7 +83,29 @@ impl Store {
     /// # Errors
     /// What the system refuses.
     pub fn write_record(&self, record: &TaskRecord) -> Result<(), WriteError> {
-        write_json(&self.record_path(Task { setting: record.setting, seed: record.seed }), record)
+        let task = Task { setting: record.setting, seed: record.seed };
+        write_json(&self.record_path(task), record)?;
+        remove(self.unfinished_path(task))
+    }
+
+    fn unfinished_path(&self, task: Task) -> PathBuf {
+        self.folder.join("tasks").join(task.name()).join("unfinished")
+    }
+
+    /// What a task of that plan left when it was stopped; None if there is nothing, or nothing whole.
+    pub fn unfinished(&self, plan_hash: u64, task: Task) -> Option<Unfinished> {
+        decode(plan_hash, &std::fs::read(self.unfinished_path(task)).ok()?)
+    }
+
+    /// Keeps how far a task of that plan has got.
+    ///
+    /// # Errors
+    /// What the system refuses.
+    pub fn write_unfinished(&self, plan_hash: u64, task: Task, so_far: &Unfinished) -> Result<(), WriteError> {
+        let path = self.unfinished_path(task);
+        let bytes =
+            encode(plan_hash, so_far).map_err(|e| WriteError { path: path.clone(), why: format!("JSON: {e}") })?;
+        whole_file::write(&path, &bytes)
     }
 
     /// Forgets a task, so that it will be done again.
@@ -88,11 +113,8 @@ impl Store {
     /// # Errors
     /// What the system refuses.
     pub fn forget(&self, task: Task) -> Result<(), WriteError> {
-        let path = self.record_path(task);
-        match std::fs::remove_file(&path) {
-            Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(WriteError { path, why: e.to_string() }),
-            _ => Ok(()),
-        }
+        remove(self.record_path(task))?;
+        remove(self.unfinished_path(task))
     }
 
     /// Writes the image of a task after so many passes.
@@ -116,6 +138,44 @@ impl Store {
     pub fn image(&self, task: Task, passes: u32) -> Result<Image, String> {
         image_file::read(&self.image_path(task, passes)).map_err(|e| e.to_string())
     }
+}
+
+fn remove(path: PathBuf) -> Result<(), WriteError> {
+    match std::fs::remove_file(&path) {
+        Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(WriteError { path, why: e.to_string() }),
+        _ => Ok(()),
+    }
+}
+
+/// Checksum of the rest, hash of the plan, length of the checkpoints as JSON, these, and three numbers for each pixel:
+/// all in little-endian order of bytes.
+fn encode(plan_hash: u64, so_far: &Unfinished) -> Result<Vec<u8>, serde_json::Error> {
+    let points = serde_json::to_vec(&so_far.points)?;
+    let mut rest = plan_hash.to_le_bytes().to_vec();
+    rest.extend((points.len() as u64).to_le_bytes());
+    rest.extend(points);
+    rest.extend(so_far.sums.iter().flat_map(|s| s.to_array()).flat_map(f64::to_le_bytes));
+    let mut bytes = fnv1a(FNV_START, &rest).to_le_bytes().to_vec();
+    bytes.extend(rest);
+    Ok(bytes)
+}
+
+fn decode(plan_hash: u64, bytes: &[u8]) -> Option<Unfinished> {
+    let number = |bytes: &[u8]| Some(u64::from_le_bytes(bytes.try_into().ok()?));
+    let (checksum, rest) = bytes.split_at_checked(8)?;
+    if number(checksum)? != fnv1a(FNV_START, rest) {
+        return None;
+    }
+    let (hash, rest) = rest.split_at_checked(8)?;
+    let (length, rest) = rest.split_at_checked(8)?;
+    if number(hash)? != plan_hash {
+        return None;
+    }
+    let (points, sums) = rest.split_at_checked(usize::try_from(number(length)?).ok()?)?;
+    let points = serde_json::from_slice(points).ok()?;
+    let values: Vec<f64> = sums.chunks_exact(8).filter_map(|c| c.try_into().ok().map(f64::from_le_bytes)).collect();
+    let sums = values.chunks_exact(3).map(DVec3::from_slice).collect();
+    Some(Unfinished { points, sums })
 }
 
 fn write_json<T: serde::Serialize>(path: &Path, value: &T) -> Result<(), WriteError> {
@@ -148,6 +208,14 @@ mod tests {
         store.write_image(task, 4, &image, &[]).expect("writes");
         assert_eq!(store.image(task, 4), Ok(image));
         assert!(store.image(task, 8).expect_err("missing").contains("8.exr"));
+        let so_far = Unfinished { points: vec![], sums: vec![DVec3::new(0.1, -2.5, 1e300), DVec3::ZERO] };
+        store.write_unfinished(5, task, &so_far).expect("writes");
+        assert_eq!(store.unfinished(5, task), Some(so_far.clone()));
+        assert_eq!(store.unfinished(6, task), None);
+        let mut bytes = encode(5, &so_far).expect("JSON");
+        assert_eq!(decode(5, &bytes[..bytes.len() - 1]), None);
+        bytes[20] ^= 1;
+        assert_eq!(decode(5, &bytes), None);
         std::fs::write(store.record_path(task), b"{\"plan\": ").expect("writes");
         assert_eq!(store.record(5, task), None);
         store.forget(task).expect("forgets");

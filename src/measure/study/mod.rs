@@ -19,4 +19,4 @@ pub use evaluate::{Evaluation, Judge};
 pub use setting::Setting;
 pub use study_plan::{Shard, StudyPlan};
 pub use sweep::Sweep;
-pub use task::{Checkpoint, TaskRecord};
+pub use task::{Checkpoint, Keep, TaskRecord, Unfinished};

@@ -2,11 +2,12 @@
 
 use crate::estimate::registry::estimator;
 use crate::measure::study::study_plan::{StudyPlan, Task, is_checkpoint};
-use crate::render::film::Image;
+use crate::render::film::{Film, Image};
 use crate::render::stats::{Seconds, StoredCounts};
 use crate::render::watch::Watch;
 use crate::render::{Renderer, Step};
 use crate::scene::Scene;
+use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 use std::time::Instant;
@@ -39,33 +40,66 @@ pub struct TaskRecord {
     pub points: Vec<Checkpoint>,
 }
 
-/// Renders a task. `keep` is given each checkpoint with its image, while the clock stands still.
-///
-/// Returns None if `watch` cancelled it.
+/// A task that is not finished: what is needed to go on at its last checkpoint.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Unfinished {
+    /// Checkpoints so far.
+    pub points: Vec<Checkpoint>,
+    /// Sum of the passes for each pixel.
+    pub sums: Vec<DVec3>,
+}
+
+/// Where a task leaves what it makes. It is called while the clock stands still.
+pub trait Keep {
+    /// What may go wrong.
+    type Error: From<String>;
+
+    /// What an earlier process left of this task.
+    fn unfinished(&mut self) -> Option<Unfinished> {
+        None
+    }
+
+    /// Keeps the image of a checkpoint, and then that the task got so far.
+    ///
+    /// # Errors
+    /// Whatever prevents it; the task ends.
+    fn keep(&mut self, image: &Image, so_far: &Unfinished) -> Result<(), Self::Error>;
+}
+
+/// Renders a task. Returns None if `watch` cancelled it.
 ///
 /// # Errors
 /// What `keep` returns, or a setting that is none.
-pub fn run<E: From<String>>(
+pub fn run<K: Keep>(
     plan: &StudyPlan,
     scene: &Arc<Scene>,
     task: Task,
     watch: &dyn Watch,
-    mut keep: impl FnMut(&Checkpoint, &Image) -> Result<(), E>,
-) -> Result<Option<TaskRecord>, E> {
+    keep: &mut K,
+) -> Result<Option<TaskRecord>, K::Error> {
     let setting = &plan.settings[task.setting];
     let mut settings = setting.onto(&plan.base);
     settings.seed = task.seed;
+    let size = settings.size;
     let chosen = estimator(&setting.estimator).map_err(|e| e.to_string())?;
     let start = Instant::now();
     let mut renderer = Renderer::new(Arc::clone(scene), settings, vec![chosen]);
     let mut spent = start.elapsed().as_secs_f64();
-    let mut points = Vec::new();
+    let mut so_far = Unfinished { points: Vec::new(), sums: Vec::new() };
+    if let Some(old) = keep.unfinished()
+        && let Some(last) = old.points.last()
+        && let Some(film) = Film::going_on(size, old.sums, last.passes)
+        && renderer.go_on(vec![film], last.photons, last.stored, last.seconds)
+    {
+        spent = last.seconds.total;
+        so_far.points = old.points;
+    }
     let enough = |passes: u32, spent: f64| {
         plan.passes.is_some_and(|p| passes >= p)
             || plan.seconds.is_some_and(|s| spent >= s) && is_checkpoint(passes)
             || passes == u32::MAX
     };
-    loop {
+    while !so_far.points.last().is_some_and(|p| enough(p.passes, p.seconds.total)) {
         let start = Instant::now();
         let step = renderer.step(watch);
         spent += start.elapsed().as_secs_f64();
@@ -73,22 +107,19 @@ pub fn run<E: From<String>>(
             return Ok(None);
         }
         let passes = renderer.passes();
-        let last = enough(passes, spent);
-        if last || is_checkpoint(passes) {
-            let point = Checkpoint {
+        if enough(passes, spent) || is_checkpoint(passes) {
+            so_far.points.push(Checkpoint {
                 passes,
                 photons: renderer.emitted(),
                 stored: renderer.stored(),
                 seconds: renderer.seconds().of_total(spent),
-            };
-            keep(&point, &renderer.films()[0].image())?;
-            points.push(point);
-        }
-        if last {
-            break;
+            });
+            let film = &renderer.films()[0];
+            so_far.sums = film.sums().to_vec();
+            keep.keep(&film.image(), &so_far)?;
         }
     }
-    let plan = format!("{:016x}", plan.hash()?);
+    let (plan, points) = (format!("{:016x}", plan.hash()?), so_far.points);
     Ok(Some(TaskRecord { plan, setting: task.setting, seed: task.seed, threads: rayon::current_num_threads(), points }))
 }
 
@@ -108,15 +139,42 @@ mod tests {
         StudyPlan::new("ring", scene, base, settings, vec![5], Some(passes), None)
     }
 
+    /// Keeps in memory, and fails after so many checkpoints.
+    struct Memory {
+        images: Vec<(u32, Image)>,
+        left: Option<Unfinished>,
+        room: usize,
+    }
+
+    impl Memory {
+        fn new(room: usize) -> Self {
+            Self { images: Vec::new(), left: None, room }
+        }
+    }
+
+    impl Keep for Memory {
+        type Error = String;
+
+        fn unfinished(&mut self) -> Option<Unfinished> {
+            self.left.take()
+        }
+
+        fn keep(&mut self, image: &Image, so_far: &Unfinished) -> Result<(), String> {
+            if self.images.len() == self.room {
+                return Err("disk full".into());
+            }
+            self.images.push((so_far.points.last().map_or(0, |p| p.passes), image.clone()));
+            self.left = Some(so_far.clone());
+            Ok(())
+        }
+    }
+
     #[test]
     fn a_task_keeps_what_a_render_makes_and_its_parts_add_up() {
         let scene = Arc::new(open("ring").expect("built in"));
         let plan = plan(&scene, 6);
-        let mut kept = Vec::new();
-        let record = run::<String>(&plan, &scene, Task { setting: 1, seed: 5 }, &Silent, |p, image| {
-            kept.push((p.passes, image.clone()));
-            Ok(())
-        });
+        let mut memory = Memory::new(9);
+        let record = run(&plan, &scene, Task { setting: 1, seed: 5 }, &Silent, &mut memory);
         let record = record.expect("no error").expect("not cancelled");
         assert_eq!(record.points.iter().map(|p| p.passes).collect::<Vec<_>>(), [1, 2, 4, 6]);
         for p in &record.points {
@@ -128,24 +186,30 @@ mod tests {
         let settings = RenderSettings { seed: 5, ..plan.settings[1].onto(&plan.base) };
         let mut alone = Renderer::new(Arc::clone(&scene), settings, vec![estimator("integrated").expect("registered")]);
         (0..4).for_each(|_| _ = alone.step(&Silent));
-        assert_eq!(kept[2].1, alone.films()[0].image());
+        assert_eq!(memory.images[2].1, alone.films()[0].image());
     }
 
+    /// A task that a full disk stopped goes on at its last checkpoint, and ends with the same bits.
     #[test]
-    fn a_failed_keep_ends_it() {
+    fn a_stopped_task_goes_on_as_if_nothing_had_been() {
         let scene = Arc::new(open("ring").expect("built in"));
-        let plan = plan(&scene, 4);
-        let task = Task { setting: 0, seed: 5 };
-        let end =
-            run::<String>(
-                &plan,
-                &scene,
-                task,
-                &Silent,
-                |p, _| {
-                    if p.passes == 2 { Err("disk full".into()) } else { Ok(()) }
-                },
-            );
-        assert_eq!(end, Err("disk full".to_owned()));
+        let plan = plan(&scene, 8);
+        let task = Task { setting: 1, seed: 5 };
+        let mut whole = Memory::new(9);
+        let expected = run(&plan, &scene, task, &Silent, &mut whole).expect("no error").expect("not cancelled");
+        let mut memory = Memory::new(3);
+        assert_eq!(run(&plan, &scene, task, &Silent, &mut memory), Err("disk full".to_owned()));
+        memory.room = 9;
+        let record = run(&plan, &scene, task, &Silent, &mut memory).expect("no error").expect("not cancelled");
+        assert_eq!(memory.images, whole.images);
+        let counts = |r: &TaskRecord| r.points.iter().map(|p| (p.passes, p.photons, p.stored)).collect::<Vec<_>>();
+        assert_eq!(counts(&record), counts(&expected));
+        let times: Vec<f64> = record.points.iter().map(|p| p.seconds.total).collect();
+        assert!(times.is_sorted(), "{times:?}");
+        // What is of another size is not gone on from.
+        memory.left = Some(Unfinished { points: record.points, sums: vec![DVec3::ZERO; 3] });
+        memory.images.clear();
+        run(&plan, &scene, task, &Silent, &mut memory).expect("no error");
+        assert_eq!(memory.images, whole.images);
     }
 }
