@@ -70,7 +70,7 @@ fn a_study_is_the_same_in_one_run_and_in_shards() {
     let folder = tempfile::tempdir().expect("a folder");
     let at = |name: &str| folder.path().join(name);
     let table = study(folder.path(), &at("one"), &[]);
-    assert!(table.contains("integrated photons=2000") && table.contains("seconds  best"), "{table}");
+    assert!(table.contains("integrated photons=2000") && table.contains("budget s"), "{table}");
     let whole = json(&at("one").join("study.json"));
     assert_eq!(whole["tasks_done"], 8);
     assert_eq!(whole["curves"].as_array().expect("curves").len(), 4);

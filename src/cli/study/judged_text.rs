@@ -56,7 +56,7 @@ fn curves(curves: &[Curve]) -> Table {
 }
 
 fn budgets(report: &StudyReport) -> Table {
-    let mut table = Table::new(["seconds", "best", "error", "next", "x"]);
+    let mut table = Table::new(["budget s", "best", "error", "next", "x"]);
     for best in report.pareto {
         let others = best.ratios.iter().enumerate().filter(|(i, _)| *i != best.curve);
         let next = others.filter_map(|(i, r)| Some((i, (*r)?))).min_by(|a, b| a.1.total_cmp(&b.1));
