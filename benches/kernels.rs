@@ -3,9 +3,10 @@
 #![allow(clippy::expect_used, missing_docs, reason = "a failed expectation is how this program reports")]
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
-use cusp::estimate::polygon::mean_over_parallelogram;
+use cusp::estimate::polygon::{integral_over_polygon, mean_over_parallelogram};
 use cusp::estimate::registry::estimator;
 use cusp::estimate::{Estimator, Gathered, View};
+use cusp::math::angle::angle;
 use cusp::math::sequence::{Sampling, Sequence};
 use cusp::photons::kd_tree::Nearest;
 use cusp::photons::map::{FootprintLimits, MapParts, Query};
@@ -15,7 +16,7 @@ use cusp::render::{RenderSettings, Renderer};
 use cusp::scene::open;
 use cusp::scene::scene_file::RenderFile;
 use cusp::trace::Ray;
-use glam::Vec3;
+use glam::{DVec2, Vec3};
 use std::hint::black_box;
 
 /// The caustic photons of the ring and a grid of view hits inside it.
@@ -111,13 +112,42 @@ fn polygon(c: &mut Criterion) {
             [v(0) * 1.5, v(1), v(2)]
         })
         .collect();
-    let mut group = c.benchmark_group("mean_over_1000_parallelograms");
-    group.bench_function("closed_form", |b| {
-        b.iter(|| cases.iter().map(|[c, u, v]| mean_over_parallelogram(*c, *u, *v)).sum::<f64>());
-    });
+    // Photons on a floor that are smaller than the pixel, as dense caustics have them.
+    let small: Vec<[Vec3; 3]> = (0..1000)
+        .map(|i| {
+            let x = sequence.four(i, 9);
+            let reach = 1.0 + 10.0 * x[3];
+            let in_plane = |v: Vec3| Vec3::new(v.x, v.y, 0.0) * reach;
+            let v = |s| Vec3::from_slice(&sequence.four(i, s)[..3]) * 2.0 - 1.0;
+            [in_plane(v(0)), in_plane(v(1)), in_plane(v(2))]
+        })
+        .collect();
     let eight = cusp::estimate::multi_sampled::MultiSampled::new(8, cusp::estimate::multi_sampled::Grid::Cells);
-    group.bench_function("8x8_points (baseline)", |b| {
-        b.iter(|| cases.iter().map(|[c, u, v]| eight.mean(*c, *u, *v)).sum::<f32>());
+    for (name, cases) in [("of_all_sizes", &cases), ("larger_than_photons", &small)] {
+        let mut group = c.benchmark_group(format!("mean_over_1000_parallelograms_{name}"));
+        group.bench_function("closed_form", |b| {
+            b.iter(|| cases.iter().map(|[c, u, v]| mean_over_parallelogram(*c, *u, *v)).sum::<f64>());
+        });
+        group.bench_function("general_polygon (baseline)", |b| {
+            b.iter(|| {
+                let plane = |v: Vec3| v.truncate().as_dvec2();
+                let integral = |[c, u, v]: &[Vec3; 3]| {
+                    let (c, u, v) = (plane(*c), plane(*u), plane(*v));
+                    integral_over_polygon(&[c - u - v, c + u - v, c + u + v, c - u + v])
+                };
+                cases.iter().map(integral).sum::<f64>()
+            });
+        });
+        group.bench_function("8x8_points (baseline)", |b| {
+            b.iter(|| cases.iter().map(|[c, u, v]| eight.mean(*c, *u, *v)).sum::<f32>());
+        });
+        group.finish();
+    }
+    let vectors: Vec<DVec2> = cases.iter().map(|[c, ..]| c.truncate().as_dvec2()).collect();
+    let mut group = c.benchmark_group("angles_of_1000_vectors");
+    group.bench_function("angle", |b| b.iter(|| vectors.iter().map(|v| angle(*v)).sum::<f64>()));
+    group.bench_function("libm::atan2 (baseline)", |b| {
+        b.iter(|| vectors.iter().map(|v| libm::atan2(v.y, v.x)).sum::<f64>());
     });
     group.finish();
 }

@@ -1,5 +1,6 @@
 //! Colour, frames, sampling sequences and deterministic elementary functions.
 
+pub mod angle;
 pub mod elementary;
 pub mod frame;
 pub mod hash;
