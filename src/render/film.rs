@@ -18,7 +18,7 @@ impl Film {
     /// A black film of `size` pixels.
     pub fn new(size: [u32; 2]) -> Self {
         let pixels = size[0] as usize * size[1] as usize;
-        Self { size, sum: vec![DVec3::ZERO; pixels], groups: GroupSums::new(pixels), passes: 0 }
+        Self { size, sum: vec![DVec3::ZERO; pixels], groups: GroupSums::new(size), passes: 0 }
     }
 
     /// Pixels across and down.
@@ -66,7 +66,7 @@ impl Film {
     ///
     /// It comes from the scatter of groups of passes, so a pixel's own is a rough number below some hundred passes.
     pub fn variance(&self) -> Option<Image> {
-        self.groups.variance(self.size)
+        self.groups.variance()
     }
 
     /// Estimated error of [`Film::image`] over the pixels of `rect` that count, row by row of the whole image; all
@@ -75,7 +75,7 @@ impl Film {
     /// [`ErrorEstimate`] says what it does not see.
     pub fn error_estimate(&self, rect: Rect, counts: Option<&[bool]>) -> Option<ErrorEstimate> {
         let counted = |i: usize| counts.is_none_or(|c| c.get(i).copied().unwrap_or(false));
-        self.groups.error(&self.sum, self.size, rect.within(self.size), counted)
+        self.groups.error(&self.sum, rect.within(self.size), counted)
     }
 
     /// The mean of the finished passes, radiance in W/(m² sr).
