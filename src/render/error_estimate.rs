@@ -19,6 +19,9 @@ const BLOCK: usize = 2;
 /// Blocks along the side of a region whose noise is taken to be one.
 const REGION: usize = 4;
 
+/// Standard errors of the squared bias that a bound has on top.
+const STANDARD_ERRORS: f64 = 2.0;
+
 /// Error of the mean of some passes, as the passes themselves tell it. Means are over pixels and channels.
 ///
 /// It does not see what all passes have in common: a bias that footprints leave however small they are (an estimator
@@ -36,6 +39,8 @@ pub struct ErrorEstimate {
     pub bias_rmse: f64,
     /// `rmse` over the mean of the image; 0 if both vanish.
     pub relative: f64,
+    /// The same with two standard errors of the squared bias on top: the error is likely below.
+    pub relative_bound: f64,
 }
 
 /// Whether an estimate after so many passes is worth its time: each of the first 16, then 8 to 16 times for each
@@ -221,19 +226,27 @@ impl GroupSums {
         let n = 3.0 * counted as f64;
         let passes = self.totals.passes;
         let noise = noise * factor / n;
-        let bias = self.squared_bias(&inside);
+        let (bias, bias_bound) = self.squared_bias(&inside);
         let mean = level / n / f64::from(passes);
-        let rmse = (noise + bias).sqrt();
-        let relative = match rmse {
+        let over_mean = |rmse: f64| match rmse {
             0.0 => 0.0,
             _ if mean > 0.0 => (rmse / mean).min(f64::MAX),
             _ => f64::MAX,
         };
-        Some(ErrorEstimate { passes, rmse, noise_rmse: noise.sqrt(), bias_rmse: bias.sqrt(), relative })
+        let rmse = (noise + bias).sqrt();
+        Some(ErrorEstimate {
+            passes,
+            rmse,
+            noise_rmse: noise.sqrt(),
+            bias_rmse: bias.sqrt(),
+            relative: over_mean(rmse),
+            relative_bound: over_mean((noise + bias_bound).sqrt()),
+        })
     }
 
-    /// Mean squared bias over blocks, weighted by how many pixels of each count.
-    fn squared_bias(&self, inside: &[u8]) -> f64 {
+    /// Mean squared bias over blocks, weighted by how many pixels of each count; and the same with its
+    /// standard errors on top.
+    fn squared_bias(&self, inside: &[u8]) -> (f64, f64) {
         let t = &self.totals;
         // Blocks that count in part hold pixels of which nothing is asked; they stand in if there are no others.
         let full = (BLOCK * BLOCK) as u8;
@@ -243,27 +256,32 @@ impl GroupSums {
         let all = Line::new(t.line, t.groups);
         let later = Line::new([w - w0, wr - w0 * r0, wrr - w0 * r0 * r0], t.groups - 1);
         let columns = self.size[0].div_ceil(BLOCK);
-        let mut regions = vec![0.0; columns.div_ceil(REGION) * self.size[1].div_ceil(BLOCK).div_ceil(REGION)];
-        let (mut by_all, mut by_later, mut weight) = (0.0, 0.0, 0.0);
+        let region_columns = columns.div_ceil(REGION);
+        let mut regions = vec![[0.0; 2]; region_columns * self.size[1].div_ceil(BLOCK).div_ceil(REGION)];
+        let mut weight = 0.0;
         for (i, (b, &count)) in self.blocks.iter().zip(inside).enumerate().filter(|(_, (_, c))| **c >= least) {
             let count = f64::from(count);
             weight += count;
-            by_all += count * all.squared_slope(b);
+            let region = &mut regions[i / columns / REGION * region_columns + i % columns / REGION];
+            region[0] += count * all.squared_slope(b);
             if later.freedom > 0.0 {
-                let own = count * later.squared_slope(&b.later(t.first));
-                by_later += own;
-                regions[i / columns / REGION * columns.div_ceil(REGION) + i % columns / REGION] += own;
+                region[1] += count * later.squared_slope(&b.later(t.first));
             }
         }
-        // The first group is an outlier where a pixel's centre is not like the rest of it. Without it the line is freer,
-        // so one standard error is added, and the lower of the two counts.
-        let mut bias = by_all;
+        let sum = |k: usize| regions.iter().map(|q| q[k]).sum::<f64>();
+        // Each region counts as one draw, so that noise that its pixels share is not taken for less than it is.
+        let bound =
+            |k: usize| sum(k).max(0.0) + STANDARD_ERRORS * regions.iter().map(|q| q[k] * q[k]).sum::<f64>().sqrt();
+        let (mut bias, mut upper) = (sum(0), bound(0));
         if later.freedom > 0.0 {
-            let standard_error = regions.iter().map(|q| q * q).sum::<f64>().sqrt();
-            bias = bias.min(by_later + standard_error);
+            // The first group is an outlier where a pixel's centre is not like the rest of it. The line without it is
+            // less certain, and counts where it is lower all the same.
+            bias = bias.min(bound(1));
+            upper = upper.min(bound(1));
         }
         let radius = t.radius / f64::from(t.passes);
-        bias.max(0.0) * radius * radius / (3.0 * weight)
+        let scale = radius * radius / (3.0 * weight);
+        (bias.max(0.0) * scale, upper.max(0.0) * scale)
     }
 }
 
