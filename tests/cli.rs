@@ -66,6 +66,10 @@ fn wrong_calls_are_refused_in_one_line() {
         (vec!["render", "ring", "-o", "a.bmp"], ".exr or .png"),
         (vec!["render", "ring", "-o", "a.exr", "--passes", "0"], "--passes"),
         (vec!["render", "ring", "-o", "a.exr", "--seconds", "-1"], "--seconds"),
+        (vec!["render", "ring", "-o", "a.exr", "--seconds", "nan"], "--seconds"),
+        (vec!["render", "ring", "-o", "a.exr", "--until-error", "0"], "--until-error"),
+        (vec!["render", "ring", "-o", "a.exr", "--until-error", "-0.1"], "--until-error"),
+        (vec!["render", "ring", "-o", "a.exr", "--until-error", "inf"], "--until-error"),
         (vec!["inspect", "ring"], "--pixel"),
         (vec!["inspect", "ring", "--pixel", "12"], "column,row"),
         (vec!["inspect", "ring", "--pixel", "-1,5"], "column,row"),
@@ -232,6 +236,63 @@ fn render_writes_an_image_and_its_stats() {
     let png = folder.path().join("a.png");
     assert!(cusp(&["render", "plane", "--size", "16x16", "--quiet", "-o", path(&png)]).stdout.is_empty());
     assert_eq!(image::open(&png).expect("a PNG").width(), 16);
+}
+
+/// A render with those flags on top, its statistics as JSON, and what it printed.
+fn stats_of(flags: &[&str]) -> (serde_json::Value, Output) {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (exr, stats) = (folder.path().join("a.exr"), folder.path().join("a.json"));
+    let common = ["render", "--photons", "2000", "--size", "32x32", "-o", path(&exr), "--stats", path(&stats)];
+    let out = cusp(&[&common[..], flags].concat());
+    assert!(out.status.success(), "{}", text(&out.stderr));
+    (serde_json::from_slice(&std::fs::read(&stats).expect("reads")).expect("JSON"), out)
+}
+
+#[test]
+fn reported_seconds_add_up() {
+    let (json, _) = stats_of(&["cornell", "--passes", "3"]);
+    let seconds = json["seconds"].as_object().expect("an object");
+    let of = |key: &str| seconds[key].as_f64().expect("a number");
+    let parts: f64 = seconds.keys().filter(|k| *k != "total").map(|k| of(k)).sum();
+    assert!((parts - of("total")).abs() <= 1e-12 * of("total"), "{seconds:?}");
+    assert!(seconds.values().all(|s| s.as_f64().is_some_and(|s| s >= 0.0)), "{seconds:?}");
+    assert!(of("other") < of("total"));
+}
+
+#[test]
+fn renders_say_what_stopped_them() {
+    let (json, out) = stats_of(&["ring", "--passes", "2"]);
+    assert_eq!((&json["stopped_by"], json["error_estimate"].is_null()), (&"passes".into(), true));
+    assert!(text(&out.stdout).contains("unknown below 12 passes"));
+    // A limit that is reached first, though the error is not.
+    let (json, out) = stats_of(&["ring", "--passes", "13", "--seconds", "600", "--until-error", "1e-6"]);
+    assert_eq!((&json["stopped_by"], json["passes"].as_u64()), (&"passes".into(), Some(13)));
+    let estimate = &json["error_estimate"];
+    let of = |key: &str| estimate[key].as_f64().expect("a number");
+    assert!((of("rmse").powi(2) - of("noise_rmse").powi(2) - of("bias_rmse").powi(2)).abs() < 1e-9 * of("rmse"));
+    assert!(of("noise_rmse") > 0.0 && of("relative_bound") >= of("relative"));
+    assert!(text(&out.stdout).contains("was asked for and not reached"), "{}", text(&out.stdout));
+    assert!(text(&out.stderr).is_empty(), "{}", text(&out.stderr));
+    let (json, out) = stats_of(&["ring", "--passes", "500", "--until-error", "100"]);
+    assert_eq!((&json["stopped_by"], json["passes"].as_u64()), (&"error".into(), Some(16)));
+    assert!(text(&out.stdout).contains("was asked for and reached"));
+}
+
+#[test]
+fn a_bias_that_stays_is_warned_of() {
+    for flags in [["--gather", "knn"], ["--estimator", "coplanar"]] {
+        let (json, out) = stats_of(&[&["ring", "--until-error", "1e-6", "--passes", "1"], &flags[..]].concat());
+        assert!(text(&out.stderr).contains("leaves a bias"), "{flags:?}: {}", text(&out.stderr));
+        assert!(json["warnings"].to_string().contains("leaves a bias"));
+    }
+}
+
+/// A time that is up before anything is done leaves one pass, and says that it took longer.
+#[test]
+fn the_first_pass_is_finished() {
+    let (json, out) = stats_of(&["ring", "--seconds", "1e-9"]);
+    assert_eq!((&json["stopped_by"], json["passes"].as_u64()), (&"seconds".into(), Some(1)));
+    assert!(text(&out.stderr).contains("the first pass ended after"), "{}", text(&out.stderr));
 }
 
 /// The inspector's pixel, and the sum of its photons, against the pixel that `render` writes.

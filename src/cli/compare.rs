@@ -289,7 +289,7 @@ impl<'a> Comparison<'a> {
         let slot = Slot { estimator: &regular, gather: Gather::Overlap };
         let progress = bar(tiles(region).len() as u64, "truth", hidden);
         let view = ViewPass { maps, ..pass.view() };
-        let result = view.run(region, &[slot], &ProgressWatch { bar: &progress });
+        let result = view.run(region, &[slot], &ProgressWatch { bar: &progress, deadline: None });
         progress.finish_and_clear();
         result.complete.then(|| {
             let mut image = Image::black([region.width, region.height]);

@@ -6,6 +6,7 @@ use crate::render::watch::{TileDone, Watch};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
+use std::time::Instant;
 
 static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 
@@ -37,15 +38,17 @@ pub fn bar(steps: u64, what: &str, quiet: bool) -> ProgressBar {
     bar
 }
 
-/// Moves a bar on with every tile, and stops at Ctrl-C.
+/// Moves a bar on with every tile, and stops at Ctrl-C or at a moment.
 pub struct ProgressWatch<'a> {
     /// The bar; a step is a tile.
     pub bar: &'a ProgressBar,
+    /// When to stop.
+    pub deadline: Option<Instant>,
 }
 
 impl Watch for ProgressWatch<'_> {
     fn cancelled(&self) -> bool {
-        interrupted()
+        interrupted() || self.deadline.is_some_and(|d| Instant::now() >= d)
     }
 
     fn tile_done(&self, _tile: &TileDone) {
@@ -91,7 +94,7 @@ impl Watch for Collector<'_> {
 
 impl TileWatch for ProgressWatch<'_> {
     fn cancelled(&self) -> bool {
-        interrupted()
+        Watch::cancelled(self)
     }
 
     fn tile_done(&self, _tile: &TileResult) {

@@ -2,12 +2,12 @@
 
 use crate::export::Provenance;
 use crate::measure::ErrorMetrics;
-use crate::render::Plan;
 use crate::render::film::Rect;
 use crate::render::renderer::Renderer;
 use crate::render::settings::RenderSettings;
 use crate::render::stats::{Bounded, Seconds, StoredCounts, peak_rss_bytes};
 use crate::render::view_pass::PartSeconds;
+use crate::render::{ErrorEstimate, Plan, StoppedBy};
 use serde::Serialize;
 use std::fmt::Write;
 
@@ -35,6 +35,10 @@ pub struct RenderReport {
     pub photons_stored: StoredCounts,
     /// Wall seconds.
     pub seconds: Seconds,
+    /// What ended the render; none for a comparison, whose work is fixed.
+    pub stopped_by: Option<StoppedBy>,
+    /// Error of the image as its passes tell it, of `estimator`; none below 12 passes.
+    pub error_estimate: Option<ErrorEstimate>,
     /// Peak resident memory, where the system tells.
     pub peak_rss_bytes: Option<u64>,
     /// What was limited.
@@ -61,7 +65,9 @@ impl RenderReport {
             passes: renderer.passes(),
             photons_emitted: renderer.emitted(),
             photons_stored: renderer.stored(),
-            seconds: Seconds { load, total, ..*renderer.seconds() },
+            seconds: Seconds { load, ..*renderer.seconds() }.within(total),
+            stopped_by: None,
+            error_estimate: renderer.error_estimate(),
             peak_rss_bytes: peak_rss_bytes(),
             bounded: *renderer.bounded(),
             warnings: renderer.warnings(),

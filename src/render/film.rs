@@ -10,7 +10,8 @@ use glam::DVec3;
 pub struct Film {
     size: [u32; 2],
     sum: Vec<DVec3>,
-    groups: GroupSums,
+    /// None if the film goes on from another's sums.
+    groups: Option<GroupSums>,
     passes: u32,
 }
 
@@ -18,14 +19,14 @@ impl Film {
     /// A black film of `size` pixels.
     pub fn new(size: [u32; 2]) -> Self {
         let pixels = size[0] as usize * size[1] as usize;
-        Self { size, sum: vec![DVec3::ZERO; pixels], groups: GroupSums::new(pixels), passes: 0 }
+        Self { size, sum: vec![DVec3::ZERO; pixels], groups: Some(GroupSums::new(size)), passes: 0 }
     }
 
     /// A film that goes on from the sums of `passes` passes, one for each pixel, row by row; None if their number is
     /// another. It has no error estimate, whose own sums are not among them.
     pub fn going_on(size: [u32; 2], sum: Vec<DVec3>, passes: u32) -> Option<Self> {
         let fits = sum.len() as u64 == u64::from(size[0]) * u64::from(size[1]);
-        fits.then(|| Self { size, sum, groups: GroupSums::new(0), passes })
+        fits.then(|| Self { size, sum, groups: None, passes })
     }
 
     /// The sum of the finished passes for each pixel, row by row, W/(m² sr).
@@ -56,7 +57,9 @@ impl Film {
     /// Counts a pass as finished whose footprints have `area` relative to the first, in `(0, 1]`.
     pub fn finish_pass(&mut self, area: f64) {
         self.passes += 1;
-        self.groups.finish_pass(area, &self.sum);
+        if let Some(groups) = &mut self.groups {
+            groups.finish_pass(area, &self.sum);
+        }
     }
 
     /// The mean of the finished passes and one more, for the pixels of `rect` whose values in that pass are `pixels`.
@@ -78,7 +81,7 @@ impl Film {
     ///
     /// It comes from the scatter of groups of passes, so a pixel's own is a rough number below some hundred passes.
     pub fn variance(&self) -> Option<Image> {
-        self.groups.variance(self.size)
+        self.groups.as_ref()?.variance()
     }
 
     /// Estimated error of [`Film::image`] over the pixels of `rect` that count, row by row of the whole image; all
@@ -87,7 +90,7 @@ impl Film {
     /// [`ErrorEstimate`] says what it does not see.
     pub fn error_estimate(&self, rect: Rect, counts: Option<&[bool]>) -> Option<ErrorEstimate> {
         let counted = |i: usize| counts.is_none_or(|c| c.get(i).copied().unwrap_or(false));
-        self.groups.error(&self.sum, self.size, rect.within(self.size), counted)
+        self.groups.as_ref()?.error(&self.sum, rect.within(self.size), counted)
     }
 
     /// The mean of the finished passes, radiance in W/(m² sr).

@@ -2,6 +2,7 @@
 
 use crate::estimate::{Estimator, Lookup};
 use crate::render::change::{PhotonStore, World, film_is_kept, photons_are_kept};
+use crate::render::error_estimate::ErrorEstimate;
 use crate::render::film::{Film, Rect};
 use crate::render::pass::{Pass, scale_of};
 use crate::render::photon_pass::{Emitter, PhotonMaps, PhotonPass};
@@ -405,6 +406,11 @@ impl Renderer {
     /// One film for each estimator.
     pub fn films(&self) -> &[Film] {
         &self.films
+    }
+
+    /// Estimated error of the first estimator's image; None below 12 passes.
+    pub fn error_estimate(&self) -> Option<ErrorEstimate> {
+        self.films.first()?.error_estimate(Rect::whole(self.settings.size), None)
     }
 
     /// Passes that all estimators have finished.

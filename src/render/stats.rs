@@ -22,26 +22,27 @@ pub struct Seconds {
     pub gather: f64,
     /// Evaluating estimators.
     pub estimate: f64,
-    /// What is left of the total: reading flags, films, files.
+    /// Everything else: films, error estimates, files, passes that were dropped.
     pub other: f64,
-    /// From start to end: the sum of all of these.
+    /// From start to end: the sum of the parts.
     pub total: f64,
 }
 
 impl Seconds {
-    /// The same parts with that total; what they leave of it is `other`.
-    pub fn of_total(self, total: f64) -> Self {
-        let parts = [
-            self.load,
-            self.bvh,
-            self.plan,
-            self.photon_trace,
-            self.map_build,
-            self.view_trace,
-            self.gather,
-            self.estimate,
-        ];
-        Self { other: total - parts.iter().sum::<f64>(), total, ..self }
+    /// The parts with what they leave of `total`, wall seconds of the whole, as `other`.
+    ///
+    /// Parts are measured inside `total`; if they are longer by rounding of the clock, `total` is their sum.
+    pub fn within(self, total: f64) -> Self {
+        let parts = Self { other: 0.0, ..self }.sum();
+        let other = (total - parts).max(0.0);
+        let all = Self { other, ..self };
+        Self { total: all.sum(), ..all }
+    }
+
+    /// Sum of all parts.
+    pub fn sum(&self) -> f64 {
+        let Self { load, bvh, plan, photon_trace, map_build, view_trace, gather, estimate, other, total: _ } = *self;
+        load + bvh + plan + photon_trace + map_build + view_trace + gather + estimate + other
     }
 }
 
@@ -75,4 +76,19 @@ pub fn peak_rss_bytes() -> Option<u64> {
     let line = status.lines().find(|l| l.starts_with("VmHWM:"))?;
     let kib: u64 = line.split_whitespace().nth(1)?.parse().ok()?;
     Some(kib * 1024)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_parts_make_the_whole() {
+        let parts = Seconds { load: 0.25, gather: 1.0, estimate: 0.5, ..Default::default() };
+        let all = parts.within(2.0);
+        assert_eq!((all.other, all.total), (0.25, 2.0));
+        assert_eq!(all.sum(), all.total);
+        let longer = parts.within(1.5);
+        assert_eq!((longer.other, longer.total), (0.0, 1.75));
+    }
 }

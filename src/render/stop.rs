@@ -9,12 +9,6 @@ use serde::Serialize;
 /// rays have gone through all cells of their pixels four times.
 pub const LEAST_PASSES: u32 = 16;
 
-/// Factor on an estimated error before it is held against the limit.
-///
-/// For what the estimate does not see: at long renders of `ring` it was down to 0.79 of the true error, because the rays
-/// through 4×4 cells miss a part of the edges in a pixel in every pass alike.
-pub const SAFETY: f64 = 1.25;
-
 /// When to stop. Each part is a limit of its own, and the first that is reached counts; without any, nothing stops.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct StopRule {
@@ -22,7 +16,7 @@ pub struct StopRule {
     pub passes: Option<u32>,
     /// Seconds, above 0 and finite.
     pub seconds: Option<f64>,
-    /// Relative error, a fraction, above 0 and finite: [`SAFETY`] times [`ErrorEstimate::relative`] has to be below.
+    /// Relative error, a fraction, above 0 and finite: [`ErrorEstimate::relative_bound`] has to come down to it.
     pub error: Option<f64>,
 }
 
@@ -61,7 +55,7 @@ impl StopRule {
         if now.passes == 0 {
             return None;
         }
-        let reached = |error: f64| now.error.is_some_and(|e| e.passes >= LEAST_PASSES && SAFETY * e.relative <= error);
+        let reached = |error: f64| now.error.is_some_and(|e| e.passes >= LEAST_PASSES && e.relative_bound <= error);
         if self.error.is_some_and(reached) {
             return Some(StoppedBy::Error);
         }
@@ -92,7 +86,8 @@ mod tests {
     }
 
     fn with_error(passes: u32, relative: f64) -> Standing {
-        let error = ErrorEstimate { passes, rmse: 1.0, noise_rmse: 1.0, bias_rmse: 0.0, relative };
+        let error =
+            ErrorEstimate { passes, rmse: 1.0, noise_rmse: 1.0, bias_rmse: 0.0, relative, relative_bound: relative };
         Standing { error: Some(error), ..at(passes, 1.0, 1.0) }
     }
 
@@ -152,8 +147,8 @@ mod tests {
         let rule = StopRule { passes: Some(100), seconds: Some(10.0), error: Some(0.1) };
         assert_eq!(run(rule, |_| 1.0).0, Some(StoppedBy::Seconds));
         assert_eq!(run(rule, |_| 0.01).0, Some(StoppedBy::Passes));
-        assert_eq!(rule.verdict(&with_error(100, 0.079)), Some(StoppedBy::Error));
-        assert_eq!(rule.verdict(&with_error(99, 0.081)), None);
+        assert_eq!(rule.verdict(&with_error(100, 0.1)), Some(StoppedBy::Error));
+        assert_eq!(rule.verdict(&with_error(99, 0.101)), None);
     }
 
     #[test]
@@ -161,7 +156,7 @@ mod tests {
         let rule = StopRule { error: Some(0.1), ..Default::default() };
         assert_eq!(rule.verdict(&with_error(LEAST_PASSES - 1, 0.0)), None);
         assert_eq!(rule.verdict(&with_error(LEAST_PASSES, 0.0)), Some(StoppedBy::Error));
-        assert_eq!(rule.verdict(&with_error(LEAST_PASSES, 0.1)), None);
+        assert_eq!(rule.verdict(&with_error(LEAST_PASSES, 0.11)), None);
         assert!(!rule.asks_for_error(LEAST_PASSES - 1) && rule.asks_for_error(LEAST_PASSES));
         assert!(!StopRule::default().asks_for_error(LEAST_PASSES));
     }

@@ -112,7 +112,7 @@ pub fn run<K: Keep>(
                 passes,
                 photons: renderer.emitted(),
                 stored: renderer.stored(),
-                seconds: renderer.seconds().of_total(spent),
+                seconds: renderer.seconds().within(spent),
             });
             let film = &renderer.films()[0];
             so_far.sums = film.sums().to_vec();
@@ -179,7 +179,7 @@ mod tests {
         assert_eq!(record.points.iter().map(|p| p.passes).collect::<Vec<_>>(), [1, 2, 4, 6]);
         for p in &record.points {
             let s = &p.seconds;
-            let parts = s.bvh + s.plan + s.photon_trace + s.map_build + s.view_trace + s.gather + s.estimate + s.other;
+            let parts = s.sum();
             assert!((parts - s.total).abs() < 1e-9 && s.other > -1e-6, "{s:?}");
             assert_eq!(p.photons, 2000 * u64::from(p.passes));
         }
