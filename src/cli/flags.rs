@@ -160,7 +160,10 @@ impl CommonFlags {
 }
 
 /// A whole number, as in `200000` or `2e5`.
-fn count(text: &str) -> Result<i64, String> {
+///
+/// # Errors
+/// A text that is none.
+pub fn count(text: &str) -> Result<i64, String> {
     if let Ok(n) = text.parse() {
         return Ok(n);
     }

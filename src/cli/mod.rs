@@ -9,6 +9,7 @@ pub mod inspect;
 mod inspect_report;
 mod inspect_text;
 pub mod lists;
+pub mod paper;
 pub mod progress;
 pub mod render;
 pub mod shot;
@@ -43,6 +44,8 @@ enum Command {
     Inspect(inspect::InspectArgs),
     /// Every metric of an image against another, and the difference image
     Diff(diff::DiffArgs),
+    /// A figure or table of the papers, reproduced
+    Paper(paper::PaperArgs),
     /// The workbench drawn to a file, without a window
     Shot(shot::ShotArgs),
     /// The built-in scenes
@@ -71,6 +74,7 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
         Some(Command::Render(args)) => render::run(&args),
         Some(Command::Inspect(args)) => inspect::run(&args),
         Some(Command::Diff(args)) => diff::run(&args),
+        Some(Command::Paper(args)) => paper::run(&args),
         Some(Command::Shot(args)) => shot::run(&args),
         Some(Command::Scenes(args)) => lists::scenes(&args),
         Some(Command::Estimators(args)) => lists::estimators(&args),

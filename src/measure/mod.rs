@@ -6,6 +6,7 @@ pub mod image_file;
 pub mod metrics;
 pub mod reference;
 pub mod trimmed;
+pub mod truth;
 pub mod window;
 
 pub use difference::Difference;
