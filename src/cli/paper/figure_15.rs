@@ -45,8 +45,13 @@ pub fn run(item: &'static str, flags: &PaperFlags, folder: &Path) -> Result<Done
             _ => {}
         }
     }
-    let strip =
-        Strip { title: "The common test case, all light".into(), subtitle: head.subtitle(), methods: vec![0, 1, 2] };
+    let strip = Strip {
+        title: "The common test case, all light".into(),
+        subtitle: head.subtitle(),
+        methods: vec![0, 1, 2],
+        truth: true,
+        errors: false,
+    };
     let picture = Picture { methods: &methods, shown: &shown, rows: &rows, truth: &truth, enlarge: 0 }.draw(&[strip]);
     let reference = reference.as_ref().map(|r| r.source.as_str()).filter(|_| rows[0].reference_error.is_some());
     let mut text = table(&rows);

@@ -36,16 +36,20 @@ pub fn run(item: &'static str, flags: &PaperFlags, folder: &Path) -> Result<Done
             title: format!("The caustic, whole: the {} nearest photons, as published", case.pass.settings.k),
             subtitle: head.subtitle(),
             methods: (0..5).collect(),
+            truth: true,
+            errors: false,
         },
         Strip {
             title: "The same photons, all that overlap".into(),
             subtitle: String::new(),
             methods: (5..10).collect(),
+            truth: true,
+            errors: false,
         },
     ];
     let picture = Picture { methods: &methods, shown: &shown, rows: &rows, truth: &truth, enlarge: 0 }.draw(&strips);
     let text = format!(
-        "{}\nerror: relative RMSE over the whole image against regular with 16x16 view rays, all that overlap; mean: over the truth's\n{}",
+        "{}\nerror: relative RMSE over the whole image against regular with 16x16 view rays, all that overlap; mean: over the truth's; black: pixels without light where the truth has some\n{}",
         table(&rows),
         crowding_line(&crowding, case.pass.settings.k)
     );

@@ -62,17 +62,21 @@ pub fn run(item: &'static str, flags: &PaperFlags, folder: &Path) -> Result<Done
             title: format!("The inner band, enlarged: the {} nearest photons, as published", case.pass.settings.k),
             subtitle: head.subtitle(),
             methods: (0..5).collect(),
+            truth: true,
+            errors: true,
         },
         Strip {
             title: "The same photons, all that overlap".into(),
             subtitle: String::new(),
             methods: (5..10).collect(),
+            truth: true,
+            errors: true,
         },
     ];
     let picture =
         Picture { methods: &methods, shown: &shown, rows: &rows, truth: &truth, enlarge: ENLARGE }.draw(&strips);
     let text = format!(
-        "{}\nover the crop {},{},{},{}; error: relative RMSE against regular with 16x16 view rays, all that overlap; to more rays: the same, each of the 16x16 with its own {} nearest; mean: over the truth's\n{}",
+        "{}\nover the crop {},{},{},{}; error: relative RMSE against regular with 16x16 view rays, all that overlap; to more rays: the same, each of the 16x16 with its own {} nearest; mean: over the truth's; black: pixels without light where the truth has some\n{}",
         table(&rows),
         crop.x,
         crop.y,

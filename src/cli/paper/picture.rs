@@ -20,21 +20,25 @@ pub struct Picture<'a> {
     pub rows: &'a [Row],
     /// The truth.
     pub truth: &'a Image,
-    /// Factor of enlargement; 0 averages images wider than [`WIDTH`] down to it and shows no errors.
+    /// Factor of enlargement; 0 averages images wider than [`WIDTH`] down to it.
     pub enlarge: u32,
 }
 
 /// Width of an image that is shown as a whole, pixels.
 pub const WIDTH: u32 = 320;
 
-/// A strip: title, subtitle, and the methods (their indices) from left to right; the truth follows.
+/// A strip of methods.
 pub struct Strip {
     /// Heading.
     pub title: String,
     /// Line below it.
     pub subtitle: String,
-    /// Indices of methods.
+    /// Indices of methods, from left to right.
     pub methods: Vec<usize>,
+    /// Whether the truth follows them.
+    pub truth: bool,
+    /// Whether each has its error below it.
+    pub errors: bool,
 }
 
 impl Picture<'_> {
@@ -58,20 +62,23 @@ impl Picture<'_> {
             color,
             image: if shown == size { image.clone() } else { image.resampled(shown) },
             look: Look::Tone(ToneMap::srgb(exposure)),
-            error: error.filter(|_| self.enlarge > 0),
+            error: error.filter(|_| strip.errors),
         };
         let mut columns: Vec<Column> = strip
             .methods
             .iter()
-            .map(|&i| {
+            .enumerate()
+            .map(|(place, &i)| {
                 let image = &self.shown.images[i];
-                let color = PALETTE[i % (PALETTE.len() - 1)];
+                let color = PALETTE[place % (PALETTE.len() - 1)];
                 let error = signed_error(image, self.truth);
                 column(self.methods[i].title.into(), self.rows[i].lines(), color, image, Some(error))
             })
             .collect();
-        let lines = vec!["regular, 16×16 view rays,".into(), "all that overlap".into()];
-        columns.push(column("Truth".into(), lines, TRUTH, self.truth, None));
+        if strip.truth {
+            let lines = vec!["regular, 16×16 view rays,".into(), "all that overlap".into()];
+            columns.push(column("Truth".into(), lines, TRUTH, self.truth, None));
+        }
         sheet::draw(&Sheet {
             title: strip.title.clone(),
             subtitle: strip.subtitle.clone(),

@@ -3,6 +3,7 @@
 use crate::cli::paper::test_case::{Method, Origin, Shown, TestCase};
 use crate::cli::table::{Table, percent};
 use crate::export::report::EstimatorSeconds;
+use crate::math::rgb::{Rgb, luminance};
 use crate::measure::metrics::{ErrorMetrics, Mask, compare};
 use crate::render::film::Image;
 use crate::render::settings::Gather;
@@ -32,6 +33,8 @@ pub struct Row {
     pub error_of_rays: Option<ErrorMetrics>,
     /// Error against the scene's reference.
     pub reference_error: Option<ErrorMetrics>,
+    /// Pixels that are black though the truth there has more than a hundredth of its mean.
+    pub black_pixels: u64,
 }
 
 /// Rows of methods that were rendered over one region.
@@ -63,9 +66,17 @@ pub fn rows(case: &TestCase, methods: &[Method], shown: &Shown, truth: &Image, o
                 Gather::Knn => None,
             },
             reference_error: None,
+            black_pixels: black_pixels(&shown.images[i], truth),
         }
     };
     methods.iter().enumerate().map(row).collect()
+}
+
+/// The thesis's black dots (section 5.1, observation 5) in a number.
+fn black_pixels(image: &Image, truth: &Image) -> u64 {
+    let mean = truth.pixels.iter().map(|p| luminance(*p)).sum::<f32>() / truth.pixels.len().max(1) as f32;
+    let black = |(x, t): &(&Rgb, &Rgb)| luminance(**x) == 0.0 && luminance(**t) > 0.01 * mean;
+    image.pixels.iter().zip(&truth.pixels).filter(black).count() as u64
 }
 
 impl Row {
@@ -91,7 +102,8 @@ impl Row {
 pub fn table(rows: &[Row]) -> String {
     let rays = rows.iter().any(|r| r.gather == Gather::Knn && r.error_of_rays.is_some());
     let reference = rows.iter().any(|r| r.reference_error.is_some());
-    let mut heading = vec!["estimator", "gather", "from", "view pass s", "x regular", "photons/pixel", "mean", "error"];
+    let mut heading =
+        vec!["estimator", "gather", "from", "view pass s", "x regular", "photons/pixel", "mean", "black", "error"];
     heading.extend(rays.then_some("to more rays"));
     heading.extend(reference.then_some("to reference"));
     let mut table = Table::new(heading);
@@ -104,6 +116,7 @@ pub fn table(rows: &[Row]) -> String {
             r.ratio_to_regular.map_or("-".into(), |x| format!("{x:.2}")),
             format!("{:.1}", r.photons_per_pixel),
             r.error.map_or("-".into(), |e| format!("{:.3}", e.mean_ratio)),
+            r.black_pixels.to_string(),
             percent(r.error.map(|e| e.relative_rmse)),
         ];
         cells.extend(rays.then(|| percent(r.error_of_rays.map(|e| e.relative_rmse))));
@@ -116,7 +129,7 @@ pub fn table(rows: &[Row]) -> String {
 /// One line for each row. Empty fields are unknown.
 pub fn csv(rows: &[Row]) -> String {
     let mut csv = String::from(
-        "estimator,gather,k,origin,view_trace_s,gather_s,estimate_s,view_pass_s,ratio_to_regular,photons_per_pixel,mean_ratio,relative_rmse,relative_rmse_to_more_rays,reference_relative_rmse\n",
+        "estimator,gather,k,origin,view_trace_s,gather_s,estimate_s,view_pass_s,ratio_to_regular,photons_per_pixel,mean_ratio,black_pixels,relative_rmse,relative_rmse_to_more_rays,reference_relative_rmse\n",
     );
     let number = |x: Option<f64>| x.map_or(String::new(), |x| format!("{x:.6}"));
     for r in rows {
@@ -124,7 +137,7 @@ pub fn csv(rows: &[Row]) -> String {
         // Writing to a string cannot fail.
         let _ = writeln!(
             csv,
-            "\"{}\",{},{},{},{:.6},{:.6},{:.6},{:.6},{},{:.3},{},{},{},{}",
+            "\"{}\",{},{},{},{:.6},{:.6},{:.6},{:.6},{},{:.3},{},{},{},{},{}",
             r.estimator,
             if r.k.is_some() { "knn" } else { "overlap" },
             r.k.map_or(String::new(), |k| k.to_string()),
@@ -136,10 +149,22 @@ pub fn csv(rows: &[Row]) -> String {
             number(r.ratio_to_regular),
             r.photons_per_pixel,
             number(r.error.map(|e| e.mean_ratio)),
+            r.black_pixels,
             number(r.error.map(|e| e.relative_rmse)),
             number(r.error_of_rays.map(|e| e.relative_rmse)),
             number(r.reference_error.map(|e| e.relative_rmse)),
         );
     }
     csv
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn black_dots_are_counted_where_there_is_light() {
+        let image = |v: [f32; 4]| Image { size: [4, 1], pixels: v.map(Rgb::splat).into() };
+        assert_eq!(black_pixels(&image([0.0, 0.0, 1.0, 0.0]), &image([1.0, 0.0, 1.0, 1e-4])), 1);
+    }
 }

@@ -190,7 +190,7 @@ fn chart(rows: &[Timed], head: &Head) -> Chart {
         number,
     };
     for first in rows.iter().filter(|r| r.gather == GATHERS[0]) {
-        let label = first.printed.as_ref().map_or(first.estimator.as_str(), |p| p.printed.method);
+        let label = first.printed.as_ref().map_or("Integrated (this program)", |p| p.printed.method);
         bars.push(Bar { label: label.into(), segments: vec![], number: String::new() });
         if let Some(p) = &first.printed {
             bars.push(single("    printed", p.ratio_to_regular, colors[0], format!("{:.2}", p.ratio_to_regular)));
