@@ -55,9 +55,9 @@ pub fn run(item: &'static str, flags: &PaperFlags, folder: &Path) -> Result<Done
     let picture = Picture { methods: &methods, shown: &shown, rows: &rows, truth: &truth, enlarge: 0 }.draw(&[strip]);
     let reference = reference.as_ref().map(|r| r.source.as_str()).filter(|_| rows[0].reference_error.is_some());
     let mut text = table(&rows);
-    text.push_str("\nerror: relative RMSE over the whole image against regular with 16x16 view rays; the outlines of the ring are in it, which only more view rays smooth\n");
+    text.push_str("\nerror: relative RMSE over the whole image against regular with 16x16 view rays; the outlines of the ring are in it, which only more view rays smooth; black: pixels without light where integrated finds some by overlap\n");
     if let Some(reference) = reference {
         text.push_str(&format!("to reference: the same against the {reference}\n"));
     }
-    Done::write(folder, &head, &picture, &csv(&rows), &Report { head: &head, reference, rows: &rows }, text)
+    Done::write(folder, &head, &picture, &csv(&rows), &Report { head: &head, reference, rows: &rows }, &text)
 }

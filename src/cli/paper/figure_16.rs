@@ -49,11 +49,11 @@ pub fn run(item: &'static str, flags: &PaperFlags, folder: &Path) -> Result<Done
     ];
     let picture = Picture { methods: &methods, shown: &shown, rows: &rows, truth: &truth, enlarge: 0 }.draw(&strips);
     let text = format!(
-        "{}\nerror: relative RMSE over the whole image against regular with 16x16 view rays, all that overlap; mean: over the truth's; black: pixels without light where the truth has some\n{}",
+        "{}\nerror: relative RMSE over the whole image against regular with 16x16 view rays, all that overlap; mean: over the truth's; black: pixels without light where integrated finds some by overlap\n{}",
         table(&rows),
         crowding_line(&crowding, case.pass.settings.k)
     );
-    Done::write(folder, &head, &picture, &csv(&rows), &Report { head: &head, crowding, rows: &rows }, text)
+    Done::write(folder, &head, &picture, &csv(&rows), &Report { head: &head, crowding, rows: &rows }, &text)
 }
 
 /// Whether k is enough, in a sentence.

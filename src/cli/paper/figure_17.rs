@@ -17,7 +17,7 @@ use serde::Serialize;
 use std::path::Path;
 
 /// Factor of enlargement.
-const ENLARGE: u32 = 3;
+const ENLARGE: u32 = 2;
 /// Doublings of k that are tried.
 const DOUBLINGS: u32 = 5;
 
@@ -76,7 +76,7 @@ pub fn run(item: &'static str, flags: &PaperFlags, folder: &Path) -> Result<Done
     let picture =
         Picture { methods: &methods, shown: &shown, rows: &rows, truth: &truth, enlarge: ENLARGE }.draw(&strips);
     let text = format!(
-        "{}\nover the crop {},{},{},{}; error: relative RMSE against regular with 16x16 view rays, all that overlap; to more rays: the same, each of the 16x16 with its own {} nearest; mean: over the truth's; black: pixels without light where the truth has some\n{}",
+        "{}\nover the crop {},{},{},{}; error: relative RMSE against regular with 16x16 view rays, all that overlap; to more rays: the same, each of the 16x16 with its own {} nearest; mean: over the truth's; black: pixels without light where integrated finds some by overlap\n{}",
         table(&rows),
         crop.x,
         crop.y,
@@ -85,5 +85,5 @@ pub fn run(item: &'static str, flags: &PaperFlags, folder: &Path) -> Result<Done
         case.pass.settings.k,
         crowding_line(&crowding, case.pass.settings.k)
     );
-    Done::write(folder, &head, &picture, &csv(&rows), &Report { head: &head, crop, crowding, rows: &rows }, text)
+    Done::write(folder, &head, &picture, &csv(&rows), &Report { head: &head, crop, crowding, rows: &rows }, &text)
 }

@@ -11,12 +11,11 @@ use crate::cli::paper::variants::CarriedWeight;
 use crate::estimate::multi_sampled::{Grid, MultiSampled};
 use crate::render::LightPart;
 use crate::render::film::Rect;
-use crate::render::settings::Gather;
 use serde::Serialize;
 use std::path::Path;
 
 /// Factor of enlargement.
-const ENLARGE: u32 = 3;
+const ENLARGE: u32 = 2;
 /// Sampling points along each axis, as in the figure, with titles.
 const POINTS: [(u32, &str); 4] = [
     (2, "(a) Multi-sampled, 2×2"),
@@ -91,12 +90,12 @@ pub fn run(item: &'static str, flags: &PaperFlags, folder: &Path) -> Result<Done
     let picture =
         Picture { methods: &methods, shown: &shown, rows: &rows, truth: &truth, enlarge: ENLARGE }.draw(&strips);
     let text = format!(
-        "{}\nover the crop {},{},{},{}; error: relative RMSE against regular with 16x16 view rays, all that overlap; to more rays: the same, each of the 16x16 with its own {k} nearest; mean: over the truth's; black: pixels without light where the truth has some\nw_pd=carried: as listed, a photon's weight starts at that of the photon before, over N²\n",
+        "{}\nover the crop {},{},{},{}; error: relative RMSE against regular with 16x16 view rays, all that overlap; to more rays: the same, each of the 16x16 with its own {k} nearest; mean: over the truth's; black: pixels without light where integrated finds some by overlap\nw_pd=carried: as listed, a photon's weight starts at that of the photon before, over N²\n",
         table(&rows),
         crop.x,
         crop.y,
         crop.width,
         crop.height,
     );
-    Done::write(folder, &head, &picture, &csv(&rows), &Report { head: &head, crop, rows: &rows }, text)
+    Done::write(folder, &head, &picture, &csv(&rows), &Report { head: &head, crop, rows: &rows }, &text)
 }

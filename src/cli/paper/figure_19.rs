@@ -106,7 +106,7 @@ pub fn run(item: &'static str, flags: &PaperFlags, folder: &Path) -> Result<Done
         Printed { function: "get_intersection", share: printed::POLYGON_SHARE, source: "Pedersen 2011, section 5.2" };
     let picture = bars::draw(&chart(&profiles, &head), 1200);
     let report = Report { head: &head, repeats, printed, profiles: &profiles };
-    Done::write(folder, &head, &picture, &csv(&profiles), &report, text)
+    Done::write(folder, &head, &picture, &csv(&profiles), &report, &text)
 }
 
 /// Seconds of all steps, repeat by repeat.

@@ -135,13 +135,13 @@ impl Done {
         picture: &Canvas,
         csv: &str,
         report: &T,
-        text: String,
+        text: &str,
     ) -> Result<Self, Failure> {
         let [png, csv_file, json_file] = &head.files;
         let json = to_json(report)?;
         png_file::write(&folder.join(png), picture.size, &picture.rgb, &head.provenance)?;
         whole_file::write(&folder.join(csv_file), csv.as_bytes())?;
         whole_file::write(&folder.join(json_file), json.as_bytes())?;
-        Ok(Self { json, text: head.line() + &text, warnings: head.warnings.clone() })
+        Ok(Self { json, text: head.line() + text, warnings: head.warnings.clone() })
     }
 }

@@ -33,7 +33,8 @@ pub struct Row {
     pub error_of_rays: Option<ErrorMetrics>,
     /// Error against the scene's reference.
     pub reference_error: Option<ErrorMetrics>,
-    /// Pixels that are black though the truth there has more than a hundredth of its mean.
+    /// Pixels that are black where `integrated` has more than a hundredth of its mean, by the same view rays
+    /// and all photons that overlap.
     pub black_pixels: u64,
 }
 
@@ -44,6 +45,8 @@ pub fn rows(case: &TestCase, methods: &[Method], shown: &Shown, truth: &Image, o
     let own = case.pass.settings.k;
     let k = |m: &Method| (m.gather == Gather::Knn).then(|| m.k.unwrap_or(own));
     let pixels = truth.pixels.len().max(1) as f64;
+    let lit = methods.iter().position(|m| m.estimator.id() == "integrated" && m.gather == Gather::Overlap);
+    let lit = lit.map(|i| &shown.images[i]);
     let error = |image: &Image, truth: &Image| compare(image, truth, &Mask::all(truth.size)).ok();
     let row = |(i, m): (usize, &Method)| {
         let parts = shown.seconds[i];
@@ -66,17 +69,18 @@ pub fn rows(case: &TestCase, methods: &[Method], shown: &Shown, truth: &Image, o
                 Gather::Knn => None,
             },
             reference_error: None,
-            black_pixels: black_pixels(&shown.images[i], truth),
+            black_pixels: lit.map_or(0, |l| black_pixels(&shown.images[i], l)),
         }
     };
     methods.iter().enumerate().map(row).collect()
 }
 
-/// The thesis's black dots (section 5.1, observation 5) in a number.
-fn black_pixels(image: &Image, truth: &Image) -> u64 {
-    let mean = truth.pixels.iter().map(|p| luminance(*p)).sum::<f32>() / truth.pixels.len().max(1) as f32;
-    let black = |(x, t): &(&Rgb, &Rgb)| luminance(**x) == 0.0 && luminance(**t) > 0.01 * mean;
-    image.pixels.iter().zip(&truth.pixels).filter(black).count() as u64
+/// The thesis's black dots (section 5.1, observation 5) in a number: pixels of `image` without light where `lit` has
+/// more than a hundredth of its mean.
+fn black_pixels(image: &Image, lit: &Image) -> u64 {
+    let mean = lit.pixels.iter().map(|p| luminance(*p)).sum::<f32>() / lit.pixels.len().max(1) as f32;
+    let black = |(x, l): &(&Rgb, &Rgb)| luminance(**x) == 0.0 && luminance(**l) > 0.01 * mean;
+    image.pixels.iter().zip(&lit.pixels).filter(black).count() as u64
 }
 
 impl Row {

@@ -67,7 +67,7 @@ pub fn run(item: &'static str, flags: &PaperFlags, folder: &Path) -> Result<Done
     );
     let picture = bars::draw(&chart(&rows, &head), 900);
     let report = Report { head: &head, repeats: flags.repeats(), rows: &rows };
-    Done::write(folder, &head, &picture, &csv(&rows), &report, text)
+    Done::write(folder, &head, &picture, &csv(&rows), &report, &text)
 }
 
 /// Seconds of each method in each repeat. Methods take turns at being first.
