@@ -213,6 +213,7 @@ fn empty_and_tiny_cases_are_defined() {
 }
 
 /// Ctrl-C ends it cleanly, with exit code 130 and no part of an item.
+#[cfg(unix)]
 #[test]
 fn an_interrupted_item_leaves_nothing() {
     let folder = tempfile::tempdir().expect("a folder");
