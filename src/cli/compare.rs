@@ -17,15 +17,14 @@ use crate::export::tone::{Look, ToneMap, auto_exposure, to_srgb};
 use crate::export::{Provenance, exr_file, names, png_file, whole_file};
 use crate::measure::Reference;
 use crate::measure::metrics::{Mask, compare};
+use crate::measure::truth::{TRUTH_RAYS, truth};
 use crate::measure::window::{busiest_window, contours, disagreement};
-use crate::photons::map::MapParts;
 use crate::render::Step;
 use crate::render::film::{Image, Rect};
 use crate::render::photon_pass::PhotonMaps;
 use crate::render::plan::Slot;
 use crate::render::settings::{Gather, LightPart, PlanMode, RenderSettings};
 use crate::render::tiles::tiles;
-use crate::render::view_pass::ViewPass;
 use crate::render::{Plan, Renderer};
 use crate::scene::{built_in, open};
 use clap::{Args, ValueEnum};
@@ -33,8 +32,6 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
-/// View rays along a pixel's side in the truth that estimators are compared with.
-pub const TRUTH_RAYS: u32 = 16;
 /// Largest crop that is chosen by default.
 const CROP: [u32; 2] = [128, 96];
 
@@ -275,33 +272,10 @@ impl<'a> Comparison<'a> {
             Truth::Full => Rect::whole(self.renderer.settings().size),
         };
         let pass = self.renderer.last_pass()?;
-        let parts = MapParts { kd_tree: false, overlap: true };
-        let own;
-        let maps = if self.renderer.plan().overlap {
-            &pass.maps
-        } else {
-            let scale = self.renderer.settings().footprint_scale;
-            own =
-                PhotonMaps::with_parts(self.renderer.scene(), self.renderer.plan(), &pass.photons.stored, scale, parts);
-            &own
-        };
-        let regular = Regular::with_rays(TRUTH_RAYS);
-        let slot = Slot { estimator: &regular, gather: Gather::Overlap };
         let progress = bar(tiles(region).len() as u64, "truth", hidden);
-        let view = ViewPass { maps, ..pass.view() };
-        let result = view.run(region, &[slot], &ProgressWatch { bar: &progress, deadline: None });
+        let image = truth(pass, region, &ProgressWatch { bar: &progress, deadline: None });
         progress.finish_and_clear();
-        result.complete.then(|| {
-            let mut image = Image::black([region.width, region.height]);
-            for tile in &result.tiles {
-                let r = tile.rect;
-                for (i, p) in tile.images[0].pixels.iter().enumerate() {
-                    let (x, y) = (r.x - region.x + i as u32 % r.width, r.y - region.y + i as u32 / r.width);
-                    image.pixels[(y * region.width + x) as usize] = *p;
-                }
-            }
-            (region, image)
-        })
+        Some((region, image?))
     }
 
     /// Photon pass and maps once more, with the plan and with everything forced on.
@@ -426,7 +400,7 @@ impl<'a> Comparison<'a> {
             error: truth.map(|(region, t)| {
                 // A full truth is cut to the crop.
                 let t = if *region == crop { t.clone() } else { t.crop(crop) };
-                signed_error(&image.crop(crop), &t)
+                sheet::signed_error(&image.crop(crop), &t)
             }),
         });
         Sheet {
@@ -450,11 +424,4 @@ impl<'a> Comparison<'a> {
             enlarge: self.enlarge,
         }
     }
-}
-
-/// Error over the truth's mean.
-fn signed_error(image: &Image, truth: &Image) -> Image {
-    let mean = truth.pixels.iter().map(|p| crate::math::rgb::mean(*p)).sum::<f32>() / truth.pixels.len().max(1) as f32;
-    let scale = if mean > 0.0 { 1.0 / mean } else { 0.0 };
-    Image { size: image.size, pixels: image.pixels.iter().zip(&truth.pixels).map(|(x, t)| (*x - *t) * scale).collect() }
 }

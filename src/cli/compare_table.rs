@@ -1,8 +1,8 @@
 //! What `compare` prints for people.
 
-use crate::cli::compare::TRUTH_RAYS;
 use crate::cli::table::{Table, percent};
 use crate::export::report::CompareReport;
+use crate::measure::truth::TRUTH_RAYS;
 use std::path::Path;
 
 /// The table for people.

@@ -161,7 +161,10 @@ impl CommonFlags {
 }
 
 /// A whole number, as in `200000` or `2e5`.
-fn count(text: &str) -> Result<i64, String> {
+///
+/// # Errors
+/// A text that is none.
+pub fn count(text: &str) -> Result<i64, String> {
     whole_number(text).ok_or_else(|| "not a whole number".into())
 }
 

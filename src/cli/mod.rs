@@ -9,6 +9,7 @@ pub mod inspect;
 mod inspect_report;
 mod inspect_text;
 pub mod lists;
+pub mod paper;
 pub mod progress;
 pub mod render;
 pub mod shot;
@@ -48,6 +49,8 @@ enum Command {
     Study(study::StudyArgs),
     /// The shards of a study as one
     Merge(study::merge::MergeArgs),
+    /// A figure or table of the papers, reproduced
+    Paper(paper::PaperArgs),
     /// The workbench drawn to a file, without a window
     Shot(shot::ShotArgs),
     /// The built-in scenes
@@ -78,6 +81,7 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
         Some(Command::Diff(args)) => diff::run(&args),
         Some(Command::Study(args)) => study::run(&args),
         Some(Command::Merge(args)) => study::merge::run(&args),
+        Some(Command::Paper(args)) => paper::run(&args),
         Some(Command::Shot(args)) => shot::run(&args),
         Some(Command::Scenes(args)) => lists::scenes(&args),
         Some(Command::Estimators(args)) => lists::estimators(&args),

@@ -74,7 +74,7 @@ impl Coplanar {
 
     /// Centre and half-edges of the view footprint in the photon's footprint, along the view ray; None if it is far off.
     #[inline]
-    fn projected(photon: &MapPhoton, view: &View) -> Option<[DVec2; 3]> {
+    pub fn projected(photon: &MapPhoton, view: &View) -> Option<[DVec2; 3]> {
         let v = view.direction;
         let across = photon.normal.dot(v);
         if across.abs() < 1e-6 {
@@ -95,14 +95,21 @@ impl Coplanar {
         Some([pc, pa, pb])
     }
 
-    fn over_area(&self, photon: &MapPhoton, view: &View) -> f64 {
-        let Some([pc, pa, pb]) = Self::projected(photon, view) else {
-            return 0.0;
-        };
+    /// A view footprint that [`Coplanar::projected`] gave, clipped by the photon's polygon.
+    #[inline]
+    pub fn clipped(&self, [pc, pa, pb]: [DVec2; 3]) -> ClippedPolygon {
         let mut polygon = ClippedPolygon::whole(pc, pa, pb);
         for plane in &self.planes {
             polygon.clip(plane);
         }
+        polygon
+    }
+
+    fn over_area(&self, photon: &MapPhoton, view: &View) -> f64 {
+        let Some(projected) = Self::projected(photon, view) else {
+            return 0.0;
+        };
+        let polygon = self.clipped(projected);
         let (coverage, centroid) = polygon.coverage_and_centroid();
         if coverage <= 0.0 {
             return 0.0;
@@ -166,13 +173,10 @@ impl Estimator for Coplanar {
 
     /// The covered part, and as its only point the centroid at which `weight=centroid` evaluates the kernel.
     fn construction(&self, photon: &MapPhoton, view: &View) -> Construction {
-        let Some([pc, pa, pb]) = Self::projected(photon, view) else {
+        let Some(projected) = Self::projected(photon, view) else {
             return Construction::default();
         };
-        let mut polygon = ClippedPolygon::whole(pc, pa, pb);
-        for plane in &self.planes {
-            polygon.clip(plane);
-        }
+        let polygon = self.clipped(projected);
         let (coverage, centroid) = polygon.coverage_and_centroid();
         let [a, b] = view.query.axes;
         let at = |p: DVec2| view.query.center + a * p.x as f32 + b * p.y as f32;

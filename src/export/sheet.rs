@@ -98,14 +98,15 @@ pub fn draw(sheet: &Sheet) -> Canvas {
             canvas.paste(x, y, error.size, &signed_colors(error), sheet.enlarge);
         }
     }
-    let note = if has_error {
-        "above: the framed part, enlarged without smoothing; below: its error against regular with 16×16 view rays on the same photons, orange too bright, blue too dark, full at ± the truth's mean"
-    } else if overview {
-        "below each image: the framed part, enlarged without smoothing"
-    } else {
-        "enlarged without smoothing"
+    let error = "error against regular with 16×16 view rays on the same photons, orange too bright, blue too dark, full at ± the truth's mean";
+    let note = match (overview, has_error) {
+        (true, true) => format!("above: the framed part, enlarged without smoothing; below: its {error}"),
+        (true, false) => "below each image: the framed part, enlarged without smoothing".into(),
+        (false, true) => format!("above: enlarged without smoothing; below: {error}"),
+        (false, false) if sheet.enlarge > 1 => "enlarged without smoothing".into(),
+        (false, false) => String::new(),
     };
-    canvas.text(GAP, height - LINE - 4, width - 2 * GAP, 15.0, FAINT, Face::Proportional, note);
+    canvas.text(GAP, height - LINE - 4, width - 2 * GAP, 15.0, FAINT, Face::Proportional, &note);
     canvas
 }
 
@@ -142,6 +143,13 @@ fn frame(canvas: &mut Canvas, x: u32, y: u32, crop: Rect, size: [u32; 2], shown:
     canvas.fill(left, top + h - 1, w, 1, FRAME);
     canvas.fill(left, top, 1, h, FRAME);
     canvas.fill(left + w - 1, top, 1, h, FRAME);
+}
+
+/// `image - truth` over the truth's mean, for [`Column::error`]; 0 for a black truth. Both have the same size.
+pub fn signed_error(image: &Image, truth: &Image) -> Image {
+    let mean = truth.pixels.iter().map(|p| crate::math::rgb::mean(*p)).sum::<f32>() / truth.pixels.len().max(1) as f32;
+    let scale = if mean > 0.0 { 1.0 / mean } else { 0.0 };
+    Image { size: image.size, pixels: image.pixels.iter().zip(&truth.pixels).map(|(x, t)| (*x - *t) * scale).collect() }
 }
 
 /// Signed values in [-1, 1] as blue, grey, orange.

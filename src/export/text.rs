@@ -47,6 +47,20 @@ impl Canvas {
         }
     }
 
+    /// This canvas with `other` below it; the narrower one is filled up with its own first pixel's colour.
+    pub fn above(self, other: &Self) -> Self {
+        let width = self.size[0].max(other.size[0]);
+        let widened = |c: &Self| {
+            let ground = c.rgb.get(..3).map_or([0; 3], |p| [p[0], p[1], p[2]]);
+            let mut wide = Self::new([width, c.size[1]], ground);
+            wide.paste(0, 0, c.size, &c.rgb, 1);
+            wide.rgb
+        };
+        let mut rgb = widened(&self);
+        rgb.extend(widened(other));
+        Self { size: [width, self.size[1] + other.size[1]], rgb }
+    }
+
     fn set(&mut self, x: u32, y: u32, color: [u8; 3]) {
         let at = 3 * (y * self.size[0] + x) as usize;
         self.rgb[at..at + 3].copy_from_slice(&color);
@@ -106,6 +120,12 @@ mod tests {
         let ink = |x: u32, y: u32| canvas.rgb[3 * (y * 120 + x) as usize] > 0;
         assert!((10..70).any(|x| (10..28).any(|y| ink(x, y))));
         assert!((72..120).all(|x| (0..40).all(|y| !ink(x, y))));
+    }
+
+    #[test]
+    fn canvases_stand_above_each_other() {
+        let both = Canvas::new([2, 1], [1; 3]).above(&Canvas::new([3, 2], [2; 3]));
+        assert_eq!((both.size, both.rgb), ([3, 3], [[1u8; 9], [2; 9], [2; 9]].concat()));
     }
 
     #[test]

@@ -9,6 +9,7 @@ pub mod reference;
 pub mod study;
 pub mod tracer;
 pub mod trimmed;
+pub mod truth;
 pub mod window;
 
 pub use difference::Difference;

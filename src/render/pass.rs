@@ -2,7 +2,7 @@
 
 use crate::estimate::Estimator;
 use crate::render::photon_pass::{Emitter, PhotonMaps, PhotonPass};
-use crate::render::plan::{Pilot, Plan};
+use crate::render::plan::{Pilot, Plan, Slot};
 use crate::render::renderer::{area_factor, slots};
 use crate::render::settings::RenderSettings;
 use crate::render::tiles::TILE;
@@ -44,9 +44,21 @@ impl Pass {
         number: u32,
         cancelled: &(dyn Fn() -> bool + Sync),
     ) -> Option<Self> {
+        let slots = slots(estimators, settings.gather);
+        Self::for_slots(scene, settings, &slots, number, cancelled)
+    }
+
+    /// The same, planned for estimators that need not all gather alike.
+    pub fn for_slots(
+        scene: Arc<Scene>,
+        settings: RenderSettings,
+        slots: &[Slot],
+        number: u32,
+        cancelled: &(dyn Fn() -> bool + Sync),
+    ) -> Option<Self> {
         let intersector = Arc::new(Intersector::new(&scene.geometry, scene.radius));
         let pilot = Pilot::needed(&scene, &settings).then(|| Pilot::send(&scene, &intersector, &settings));
-        let plan = Plan::new(&scene, &settings, &slots(estimators, settings.gather), pilot.as_ref());
+        let plan = Plan::new(&scene, &settings, slots, pilot.as_ref());
         let area_factor = area_factor(number);
         let (photons, maps) = (Arc::default(), PhotonMaps::default());
         let mut pass = Self { scene, intersector, settings, plan, photons, maps, number, area_factor };

@@ -6,7 +6,7 @@ use crate::math::rgb::Rgb;
 use crate::math::sequence::{Sampling, Sequence};
 use crate::photons::kd_tree::Nearest;
 use crate::photons::{PhotonKind, PhotonMap};
-use crate::render::film::Rect;
+use crate::render::film::{Image, Rect};
 use crate::render::photon_pass::PhotonMaps;
 use crate::render::plan::Slot;
 use crate::render::settings::Gather;
@@ -95,6 +95,38 @@ pub struct ViewResult {
     pub counts: ViewCounts,
     /// Whether all tiles are there.
     pub complete: bool,
+}
+
+impl ViewResult {
+    /// Radiance of one slot over `region`, which is the one that was rendered; black where a tile is missing.
+    pub fn image(&self, slot: usize, region: Rect) -> Image {
+        let mut image = Image::black([region.width, region.height]);
+        for tile in &self.tiles {
+            let at = Rect { x: tile.rect.x - region.x, y: tile.rect.y - region.y, ..tile.rect };
+            image.put(at, &tile.images[slot].pixels);
+        }
+        image
+    }
+}
+
+/// The hits of a tile with the photons that were gathered for each, kept to be evaluated more than once.
+pub struct GatheredTile {
+    hits: Vec<ViewHit>,
+    indices: Vec<u32>,
+    /// As in [`Scratch`].
+    spans: Vec<(usize, usize, f32)>,
+    /// Thread seconds of its view rays and of the gather.
+    pub seconds: PartSeconds,
+}
+
+impl GatheredTile {
+    /// Each hit with its photons in each map. `maps` are those that they were gathered from.
+    pub fn each<'a>(&'a self, maps: &'a PhotonMaps) -> impl Iterator<Item = (&'a ViewHit, Gathered<'a>)> {
+        let of_hit = self.hits.iter().flat_map(move |hit| maps.all().map(move |map| (hit, map)));
+        of_hit.zip(&self.spans).map(|((hit, map), &(from, to, radius))| {
+            (hit, Gathered { photons: map.photons(), indices: &self.indices[from..to], radius })
+        })
+    }
 }
 
 /// Follows a view pass. Every method may be called from any thread, several at once.
@@ -295,6 +327,26 @@ impl ViewPass<'_> {
         let scale = 1.0 / f64::from(n * n);
         let pixels = sums.into_iter().map(|s| finite(s * scale)).collect();
         TileImage { pixels, seconds, gathered }
+    }
+
+    /// Traces and gathers for a tile as [`ViewPass::run`] does, and keeps what was found: four bytes for each photon of
+    /// each hit.
+    pub fn gathered(&self, rect: Rect, slot: &Slot) -> GatheredTile {
+        let mut scratch = Scratch::default();
+        let start = Instant::now();
+        let rays = slot.estimator.rays_per_axis();
+        self.trace(rect, rays, &mut scratch, &mut ViewCounts::default(), &mut Unrecorded);
+        let view_trace = start.elapsed().as_secs_f64();
+        let start = Instant::now();
+        for hit in 0..scratch.hits.len() {
+            for map in self.maps.all() {
+                let from = scratch.indices.len();
+                let radius = self.gather(map, slot, hit, &mut scratch);
+                scratch.spans.push((from, scratch.indices.len(), radius));
+            }
+        }
+        let seconds = PartSeconds { view_trace, gather: start.elapsed().as_secs_f64(), estimate: 0.0 };
+        GatheredTile { hits: scratch.hits, indices: scratch.indices, spans: scratch.spans, seconds }
     }
 
     /// Calls `visit` with the photons of each of the scratch's hits (its index) in each map, as `estimate` sees them.

@@ -1,0 +1,231 @@
+//! `cusp paper`: figures and tables of the thesis, reproduced.
+
+mod bars;
+mod figure_15;
+mod figure_16;
+mod figure_17;
+mod figure_18;
+mod figure_19;
+mod methods;
+mod output;
+mod picture;
+mod printed;
+mod rows;
+mod spread;
+mod table_1;
+mod test_case;
+mod variants;
+
+use crate::cli::failure::Failure;
+use crate::cli::flags::{CommonFlags, count, size};
+use crate::cli::progress::listen_for_interrupts;
+use crate::cli::{print, to_json};
+use clap::{Args, ValueEnum};
+use output::Done;
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+
+const VERSION: &str = env!("CARGO_PKG_VERSION");
+
+/// Flags of `paper`.
+#[derive(Debug, Args)]
+pub struct PaperArgs {
+    /// What to reproduce; a list of the items if left out
+    #[arg(value_enum)]
+    item: Option<ItemName>,
+    #[command(flatten)]
+    flags: PaperFlags,
+}
+
+/// The common flags that mean something here: they override the thesis's own settings.
+#[derive(Clone, Debug, Default, Args)]
+pub struct PaperFlags {
+    /// Size of the image in pixels; 512x512 if left out
+    #[arg(long, value_name = "WxH", value_parser = size)]
+    size: Option<[u32; 2]>,
+    /// Photons emitted; 446300 if left out, which store the published 4978 caustic ones
+    #[arg(long, value_name = "N", value_parser = count, allow_negative_numbers = true)]
+    photons: Option<i64>,
+    /// Factor on the axes of all photon footprints; 8.86 if left out: the published size times the listing's smoothing
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
+    footprint_scale: Option<f64>,
+    /// Photons that the published gather looks up; the published 50 if left out
+    #[arg(long, value_name = "K", value_parser = count, allow_negative_numbers = true)]
+    k: Option<i64>,
+    /// Repeats of what is timed (table-1 and figure-19); 5 if left out
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
+    repeats: Option<u32>,
+    /// Seed of everything random; 1 if left out
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+    /// Threads; all cores if left out
+    #[arg(long, value_name = "T")]
+    threads: Option<usize>,
+    /// Folder for files; cusp-out/paper-ITEM if left out
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Print JSON instead of a table
+    #[arg(long)]
+    json: bool,
+    /// Print nothing but errors
+    #[arg(long)]
+    quiet: bool,
+}
+
+impl PaperFlags {
+    /// As the flags of other commands.
+    fn common(&self) -> CommonFlags {
+        CommonFlags {
+            size: self.size,
+            photons: self.photons,
+            footprint_scale: self.footprint_scale,
+            k: self.k,
+            seed: self.seed,
+            threads: self.threads,
+            out: self.out.clone(),
+            json: self.json,
+            quiet: self.quiet,
+            ..Default::default()
+        }
+    }
+
+    /// Repeats of what is timed.
+    fn repeats(&self) -> u32 {
+        self.repeats.unwrap_or(5)
+    }
+}
+
+/// Names of the items on the command line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum ItemName {
+    #[value(name = "figure-15")]
+    Figure15,
+    #[value(name = "figure-16")]
+    Figure16,
+    #[value(name = "figure-17")]
+    Figure17,
+    #[value(name = "figure-18")]
+    Figure18,
+    #[value(name = "table-1")]
+    Table1,
+    #[value(name = "figure-19")]
+    Figure19,
+    All,
+}
+
+/// A figure or table.
+struct Item {
+    name: ItemName,
+    id: &'static str,
+    source: &'static str,
+    summary: &'static str,
+    run: fn(&'static str, &PaperFlags, &Path) -> Result<Done, Failure>,
+}
+
+const ITEMS: [Item; 6] = [
+    Item {
+        name: ItemName::Figure15,
+        id: "figure-15",
+        source: "Pedersen 2011, figure 15",
+        summary: "the test case in all light",
+        run: figure_15::run,
+    },
+    Item {
+        name: ItemName::Figure16,
+        id: "figure-16",
+        source: "Pedersen 2011, figure 16",
+        summary: "the caustic by the four methods, whole",
+        run: figure_16::run,
+    },
+    Item {
+        name: ItemName::Figure17,
+        id: "figure-17",
+        source: "Pedersen 2011, figure 17",
+        summary: "its contours in the inner band of the ring, enlarged",
+        run: figure_17::run,
+    },
+    Item {
+        name: ItemName::Figure18,
+        id: "figure-18",
+        source: "Pedersen 2011, figure 18",
+        summary: "multi-sampled with 2×2 to 16×16 points",
+        run: figure_18::run,
+    },
+    Item {
+        name: ItemName::Table1,
+        id: "table-1",
+        source: "Pedersen 2011, table 1",
+        summary: "rendering times of the four methods",
+        run: table_1::run,
+    },
+    Item {
+        name: ItemName::Figure19,
+        id: "figure-19",
+        source: "Pedersen 2011, figure 19",
+        summary: "time in the polygon intersection of the coplanar method",
+        run: figure_19::run,
+    },
+];
+
+/// Reproduces an item, or lists them.
+///
+/// # Errors
+/// A wrong call, a file that cannot be written, or an interruption.
+pub fn run(args: &PaperArgs) -> Result<(), Failure> {
+    let Some(name) = args.item else {
+        return list(args.flags.json);
+    };
+    listen_for_interrupts();
+    args.flags.common().on_threads(|| make(name, &args.flags))
+}
+
+fn make(name: ItemName, flags: &PaperFlags) -> Result<(), Failure> {
+    let chosen = || ITEMS.iter().filter(|i| name == ItemName::All || i.name == name);
+    let of_all = name == ItemName::All;
+    let id = if of_all { "all" } else { chosen().next().map_or("", |i| i.id) };
+    let folder = flags.out.clone().unwrap_or_else(|| Path::new("cusp-out").join(format!("paper-{id}")));
+    let mut done = Vec::new();
+    let mut written = Vec::new();
+    for item in chosen() {
+        let result = (item.run)(item.id, flags, &folder).map_err(|failure| match failure {
+            Failure::Interrupted(why) if !written.is_empty() => {
+                Failure::Interrupted(format!("{why}; {} are in {}", written.join(", "), folder.display()))
+            }
+            other => other,
+        })?;
+        written.push(item.id);
+        if flags.json {
+            done.push(result.json);
+        } else if !flags.quiet {
+            result.warnings.iter().for_each(|w| eprintln!("warning: {w}"));
+            let end = format!("files in {}: {}.png, .csv, .json\n", folder.display(), item.id);
+            print(&format!("{}{end}{}", result.text, if of_all { "\n" } else { "" }))?;
+        }
+    }
+    match (flags.json, of_all) {
+        (true, false) => print(&done.concat()),
+        (true, true) => print(&format!("{{ \"version\": \"{VERSION}\", \"items\": [\n{}] }}\n", done.join(","))),
+        (false, _) => Ok(()),
+    }
+}
+
+#[derive(Serialize)]
+struct Listed {
+    item: &'static str,
+    source: &'static str,
+    summary: &'static str,
+}
+
+fn list(json: bool) -> Result<(), Failure> {
+    if json {
+        let items: Vec<_> = ITEMS.iter().map(|i| Listed { item: i.id, source: i.source, summary: i.summary }).collect();
+        return print(&to_json(&serde_json::json!({ "version": VERSION, "items": items }))?);
+    }
+    let mut text = String::new();
+    let width = ITEMS.iter().map(|i| i.source.len()).max().unwrap_or(0);
+    for i in &ITEMS {
+        text.push_str(&format!("{:<9}  {:<width$}  {}\n", i.id, i.source, i.summary));
+    }
+    text.push_str(&format!("{:<9}  {:<width$}  every one of them\n", "all", ""));
+    print(&text)
+}
