@@ -270,7 +270,8 @@ impl<'a> Tracer<'a> {
 
 /// A reference image of a scene: its closed form if it has one, else traced `until` it is good enough or cancelled.
 ///
-/// `progress` is told seconds and relative noise after each batch.
+/// `progress` is told seconds and relative noise after each batch. If cancelled before the first batch, the image is black
+/// and its noise unknown.
 pub fn render_reference(
     scene: &Scene,
     intersector: &Intersector,
