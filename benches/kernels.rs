@@ -12,6 +12,7 @@ use cusp::photons::kd_tree::Nearest;
 use cusp::photons::map::{FootprintLimits, MapParts, Query};
 use cusp::photons::{Photon, PhotonMap};
 use cusp::render::Silent;
+use cusp::render::film::{Film, Rect};
 use cusp::render::{RenderSettings, Renderer};
 use cusp::scene::open;
 use cusp::scene::scene_file::RenderFile;
@@ -180,5 +181,34 @@ fn tracing(c: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, gather_and_estimate, polygon, tracing);
+/// What the error estimate adds to a pass, over 16 passes with their four groups, which is where groups are densest.
+fn film(c: &mut Criterion) {
+    let size = [512, 512];
+    let scene = open("ring").expect("built in");
+    let settings = RenderSettings::new(&scene, &RenderFile::default(), Some(size), 1).expect("valid");
+    let mut renderer = Renderer::new(scene.into(), settings, vec![estimator("integrated").expect("registered")]);
+    let mut group = c.benchmark_group("film_512x512");
+    group.sample_size(10);
+    group.bench_function("16_passes_of_ring (baseline)", |b| {
+        b.iter(|| (0..16).for_each(|_| _ = renderer.step(&Silent)));
+    });
+    let image = renderer.films()[0].image();
+    let passes = |estimated: bool| {
+        let mut film = Film::new(size);
+        for i in 0..16 {
+            film.add_tile([0, 0], size[0], &image.pixels);
+            if estimated {
+                film.finish_pass(1.0 / f64::from(i + 1));
+            }
+        }
+        film
+    };
+    group.bench_function("sums_of_16_passes", |b| b.iter(|| passes(false)));
+    group.bench_function("sums_of_16_passes_and_groups", |b| b.iter(|| passes(true)));
+    let film = passes(true);
+    group.bench_function("one_error_estimate", |b| b.iter(|| film.error_estimate(Rect::whole(size), None)));
+    group.finish();
+}
+
+criterion_group!(benches, gather_and_estimate, polygon, tracing, film);
 criterion_main!(benches);

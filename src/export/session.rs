@@ -2,6 +2,7 @@
 
 use crate::estimate::{Estimator, registry};
 pub use crate::measure::difference::Difference;
+use crate::render::StopRule;
 use crate::render::film::Rect;
 use crate::render::settings::PlanMode;
 use crate::scene::scene_file::{CameraFile, LightFile, MaterialFile, RenderFile, SceneFile};
@@ -33,6 +34,12 @@ pub struct Session {
     /// Passes after which the window rests.
     #[serde(default = "many_passes")]
     pub passes: u32,
+    /// Estimated relative error of every panel, a fraction, at which the window rests before that; above 0.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub until_error: Option<f64>,
+    /// Seconds of rendering after which the window rests before that; above 0.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub seconds: Option<f64>,
     /// Whether parts that the scene does not need are left out (needed) or forced on (full).
     #[serde(default)]
     pub plan: PlanMode,
@@ -237,6 +244,8 @@ impl Session {
             size: None,
             seed: one(),
             passes: many_passes(),
+            until_error: None,
+            seconds: None,
             plan: PlanMode::Needed,
             reference: None,
             mask: None,
@@ -298,6 +307,11 @@ impl Session {
         }
         if !(1..=MAX_ENLARGE).contains(&session.enlarge) {
             return Err(locator.error("enlarge", format!("must lie in 1 to {MAX_ENLARGE}")));
+        }
+        for (key, limit) in [("until_error", session.until_error), ("seconds", session.seconds)] {
+            if limit.is_some_and(|l| !(l > 0.0 && l.is_finite())) {
+                return Err(locator.error(key, "must be positive and finite"));
+            }
         }
         if session.crop.is_some_and(|[_, _, width, height]| width == 0 || height == 0) {
             return Err(locator.error("crop", "is x, y, width, height; width and height must be at least 1"));
@@ -380,6 +394,11 @@ impl Session {
             }
         }
         all
+    }
+
+    /// When the window rests.
+    pub fn stop_rule(&self) -> StopRule {
+        StopRule { passes: Some(self.passes), seconds: self.seconds, error: self.until_error }
     }
 
     /// The crop as a rectangle.

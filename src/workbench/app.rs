@@ -242,7 +242,7 @@ impl Workbench {
 
     /// Sends a new job for the document as it is.
     fn restart(&mut self) {
-        self.desk.errors.clear();
+        self.desk.forget_errors();
         let job = self.document.job(self.render.next_generation());
         self.render.start(job, &mut self.gallery, &mut self.messages);
     }
@@ -288,9 +288,9 @@ impl Workbench {
         if let Some(pass) = self.render.pass.clone() {
             self.analysis.ask(Kind::Areas, move || Finding::Areas(Areas::of(&pass)));
         }
-        let (Some(reference), Some(progress), Some(job)) =
-            (self.desk.reference.clone(), &self.render.progress, self.render.job())
-        else {
+        let (Some(progress), Some(job)) = (&self.render.progress, self.render.job()) else { return };
+        self.desk.take_estimates(job, progress);
+        let Some(reference) = self.desk.reference.clone() else {
             return;
         };
         if job.settings.light != crate::render::LightPart::All {

@@ -12,6 +12,7 @@ use super::theme::{count, mono, number};
 use crate::estimate::registry::ESTIMATORS;
 use crate::export::session::Mode;
 use crate::math::rgb::luminance;
+use crate::render::StoppedBy;
 use crate::scene::built_in::BUILT_IN;
 use egui::{Color32, Panel, Ui};
 use egui_tiles::Tree;
@@ -139,7 +140,11 @@ fn progress(render: &Render, desk: &Desk) -> String {
     if !render.is_alive() {
         text.push_str("   stopped");
     } else if render.finished {
-        text.push_str("   done");
+        text.push_str(match render.stopped_by {
+            Some(StoppedBy::Error) => "   done: error reached",
+            Some(StoppedBy::Seconds) => "   done: time is up",
+            Some(StoppedBy::Passes | StoppedBy::Interruption) | None => "   done",
+        });
     } else if render.is_paused() {
         text.push_str("   paused");
     }

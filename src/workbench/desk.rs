@@ -7,7 +7,9 @@ use super::gallery::values::{Origin, Values};
 use super::inspector::{FoundPath, Inspected, Inspector};
 use super::overlays::photons::VisiblePhotons;
 use super::recent::Recent;
+use super::worker::messages::{Job, Progress};
 use crate::measure::{ErrorMetrics, Reference};
+use crate::render::ErrorEstimate;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
@@ -84,6 +86,15 @@ pub struct ErrorPoint {
     pub error: ErrorMetrics,
 }
 
+/// An estimated error at a time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EstimatePoint {
+    /// Seconds as in [`ErrorPoint`].
+    pub seconds: f64,
+    /// The estimate.
+    pub error: ErrorEstimate,
+}
+
 /// What lies under the pointer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hover {
@@ -118,6 +129,8 @@ pub struct Desk {
     pub reference_of: Option<super::document::ReferenceOf>,
     /// Error curves by estimator.
     pub errors: BTreeMap<String, Vec<ErrorPoint>>,
+    /// Curves of estimated errors by estimator.
+    pub estimates: BTreeMap<String, Vec<EstimatePoint>>,
     /// The inspector.
     pub inspector: Inspector,
     /// What each panel's numbers were asked for last.
@@ -149,6 +162,27 @@ impl Desk {
     /// Seconds with a fitting unit; a dash where times are left out.
     pub fn seconds(&self, s: f64) -> String {
         if self.untimed { "-".into() } else { super::theme::seconds(s) }
+    }
+
+    /// Takes in what the worker estimated after a pass.
+    pub fn take_estimates(&mut self, job: &Job, progress: &Progress) {
+        for (i, name) in job.estimators.iter().enumerate() {
+            let (Some(Some(error)), Some(shared), Some(own)) =
+                (progress.estimates.get(i), progress.photon_seconds.get(i), progress.estimator_seconds.get(i))
+            else {
+                continue;
+            };
+            let curve = self.estimates.entry(name.clone()).or_default();
+            if curve.last().is_none_or(|last| last.error.passes < error.passes) {
+                curve.push(EstimatePoint { seconds: shared + own.total(), error: *error });
+            }
+        }
+    }
+
+    /// Forgets all errors: the images are others.
+    pub fn forget_errors(&mut self) {
+        self.errors.clear();
+        self.estimates.clear();
     }
 
     /// The last error of an estimator.

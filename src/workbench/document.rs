@@ -144,7 +144,7 @@ impl Document {
             self.settings = settings(&self.scene, now)?;
             change = Change::Render;
         }
-        if estimators(now) != estimators(before) || now.passes != before.passes {
+        if estimators(now) != estimators(before) || now.stop_rule() != before.stop_rule() {
             change = Change::Render;
         }
         Ok(change)
@@ -218,7 +218,7 @@ impl Document {
             scene: Arc::clone(&self.scene),
             settings: self.settings.clone(),
             estimators: estimators(&self.settled),
-            passes: self.settled.passes,
+            stop: self.settled.stop_rule(),
         }
     }
 

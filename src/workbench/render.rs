@@ -4,7 +4,7 @@ use super::gallery::Gallery;
 use super::messages::Messages;
 use super::worker::messages::{Event, Job, Progress};
 use super::worker::{Wake, Worker};
-use crate::render::Pass;
+use crate::render::{Pass, StoppedBy};
 use std::cell::Cell;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -29,6 +29,8 @@ pub struct Render {
     pub progress: Option<Progress>,
     /// Whether the worker rests because all is done.
     pub finished: bool,
+    /// What was done when it came to rest last.
+    pub stopped_by: Option<StoppedBy>,
     /// Counts up with every finished pass.
     pub passes_seen: u64,
     /// Tiles of the pass that have come.
@@ -53,6 +55,7 @@ impl Render {
             draft: false,
             progress: None,
             finished: false,
+            stopped_by: None,
             passes_seen: 0,
             tiles: 0,
             drafts_seen: 0,
@@ -71,6 +74,7 @@ impl Render {
         gallery.start(&job);
         self.generation = job.generation;
         self.finished = false;
+        self.stopped_by = None;
         self.started = Instant::now();
         self.first_tile = None;
         self.progress = None;
@@ -130,7 +134,10 @@ impl Render {
                     self.passes_seen += 1;
                     pass_done.set(true);
                 }
-                Event::Finished { .. } => self.finished = true,
+                Event::Finished { why, .. } => {
+                    self.finished = true;
+                    self.stopped_by = Some(why);
+                }
                 Event::Failed { why } => {
                     messages.error(format!("{why}; start another with Render > Restart the render thread"));
                     failed = true;

@@ -26,7 +26,7 @@ fn job(session: &Session, generation: u64) -> Job {
     let (_, scene) = session.open_scene().expect("opens");
     let settings = RenderSettings::new(&scene, &session.render, session.size, session.seed).expect("valid");
     let estimators = session.panels.iter().map(|p| p.estimator.clone()).collect();
-    Job { generation, scene: Arc::new(scene), settings, estimators, passes: session.passes }
+    Job { generation, scene: Arc::new(scene), settings, estimators, stop: session.stop_rule() }
 }
 
 /// Runs `step` until it says so.

@@ -1,7 +1,7 @@
 //! Photons and how they are gathered.
 
 use super::Panes;
-use super::widgets::{choice, integer, real, rows};
+use super::widgets::{choice, integer, name as name_widget, real, rows};
 use egui::Ui;
 
 /// Most photons that a slider offers; the field takes more.
@@ -72,11 +72,64 @@ pub(super) fn show(panes: &mut Panes, ui: &mut Ui) {
         if integer(ui, "Passes", tip, &mut passes, 1..=100_000) {
             session.passes = passes as u32;
         }
+        limit(
+            ui,
+            "Stop at error",
+            &mut session.until_error,
+            Limit {
+                tip: "rest before that, when the estimated error of every panel is likely below this part of its mean",
+                first: 0.02,
+                factor: 100.0,
+                unit: " %",
+            },
+        );
+        limit(
+            ui,
+            "Stop at time",
+            &mut session.seconds,
+            Limit {
+                tip: "rest before that, when the passes have taken so long; the next pass counts as long as the last",
+                first: 60.0,
+                factor: 1.0,
+                unit: " s",
+            },
+        );
         let mut seed = session.seed as i64;
         if integer(ui, "Seed", "seed of everything random", &mut seed, 0..=1_000_000) {
             session.seed = seed as u64;
         }
     });
+}
+
+/// How a limit is shown.
+struct Limit {
+    tip: &'static str,
+    /// Its value when it is switched on.
+    first: f64,
+    /// From the value to what is shown.
+    factor: f64,
+    unit: &'static str,
+}
+
+/// A limit that can be off.
+fn limit(ui: &mut Ui, label: &str, value: &mut Option<f64>, Limit { tip, first, factor, unit }: Limit) {
+    let title = ui.label(label).on_hover_text(tip);
+    ui.horizontal(|ui| {
+        let mut on = value.is_some();
+        if ui.checkbox(&mut on, "").labelled_by(title.id).on_hover_text(tip).changed() {
+            *value = on.then_some(first);
+        }
+        let Some(value) = value else { return };
+        let mut shown = *value * factor;
+        let speed = shown * 0.01;
+        let drag = egui::DragValue::new(&mut shown).speed(speed).range(1e-3..=1e6).suffix(unit);
+        let response = ui.add(drag).on_hover_text(tip);
+        name_widget(&response, &format!("{label}, limit"));
+        if response.changed() {
+            *value = shown / factor;
+        }
+    });
+    ui.end_row();
 }
 
 /// Names of settings as the scene file writes them.

@@ -1,9 +1,10 @@
 //! Plots: error against run time, time by phase, footprint areas.
 
 use super::Panes;
+use crate::workbench::desk::Desk;
 use crate::workbench::theme::{self, number, seconds};
 use egui::{Color32, Ui};
-use egui_plot::{Bar, BarChart, Corner, GridMark, HoverPosition, Legend, Line, Plot, PlotPoints, Points};
+use egui_plot::{Bar, BarChart, Corner, GridMark, HoverPosition, Legend, Line, LineStyle, Plot, PlotPoints, Points};
 use std::ops::RangeInclusive;
 
 /// In place of plots of times where those are left out.
@@ -41,25 +42,52 @@ fn log10(x: f64) -> Option<f64> {
     (x > 0.0 && x.is_finite()).then(|| libm::log10(x))
 }
 
+/// A line of the error plot: log10 of seconds and of relative RMSE.
+struct Curve {
+    title: String,
+    panel: usize,
+    points: Vec<[f64; 2]>,
+    estimated: bool,
+}
+
+/// The measured curves of the panels, then the estimated ones.
+fn error_curves(desk: &Desk, names: &[&str]) -> Vec<Curve> {
+    let distinct = || names.iter().enumerate().filter(|(i, name)| !names[..*i].contains(name));
+    let measured = distinct().filter_map(|(panel, name)| {
+        let points = desk.errors.get(*name)?.iter();
+        let points = points.filter_map(|p| Some([log10(p.seconds)?, log10(p.error.relative_rmse)?])).collect();
+        Some(Curve { title: short(names, name).to_owned(), panel, points, estimated: false })
+    });
+    let estimated = distinct().filter_map(|(panel, name)| {
+        let points = desk.estimates.get(*name)?.iter();
+        let points = points.filter_map(|p| Some([log10(p.seconds)?, log10(p.error.relative)?])).collect();
+        Some(Curve { title: format!("{}, estimated", short(names, name)), panel, points, estimated: true })
+    });
+    measured.chain(estimated).collect()
+}
+
 pub(super) fn errors(panes: &mut Panes, ui: &mut Ui) {
     ui.horizontal(|ui| {
         ui.strong("Error against run time").on_hover_text(
-            "relative RMSE against the reference, over seconds of photons, maps and the estimator's own view passes; both axes logarithmic",
+            "relative RMSE over seconds of photons, maps and the estimator's own view passes; both axes logarithmic. \
+             Full: against the reference. Dashed: estimated from the scatter of the passes, from pass 12 on; it does not \
+             see a bias that stays",
         );
         if let Some(reference) = &panes.desk.reference {
             ui.weak(&reference.source);
         }
     });
-    if panes.desk.reference.is_none() {
-        ui.weak("No reference is loaded. Some built-in scenes bring one, which shows them unedited; File > Compare with a reference image takes an EXR or PNG.");
+    let session = &panes.document.session;
+    let names: Vec<&str> = session.panels.iter().map(|p| p.estimator.as_str()).collect();
+    let curves = error_curves(panes.desk, &names);
+    if panes.desk.reference.is_none() && curves.is_empty() {
+        ui.weak("No reference is loaded. Some built-in scenes bring one, which shows them unedited; File > Compare with a reference image takes an EXR or PNG. From pass 12 on the error that the passes themselves tell is shown.");
         return;
     }
     if panes.desk.untimed {
         ui.weak(UNTIMED);
         return;
     }
-    let session = &panes.document.session;
-    let names: Vec<&str> = session.panels.iter().map(|p| p.estimator.as_str()).collect();
     let format = |at: &HoverPosition| match at {
         HoverPosition::NearDataPoint { plot_name, position, .. } => {
             let (x, y) = (libm::exp10(position.x), libm::exp10(position.y));
@@ -74,18 +102,13 @@ pub(super) fn errors(panes: &mut Panes, ui: &mut Ui) {
         .x_axis_label("s")
         .legend(legend(Corner::RightTop))
         .show(ui, |plot| {
-            for (i, name) in names.iter().enumerate() {
-                if names[..i].contains(name) {
-                    continue;
-                }
-                let Some(curve) = panes.desk.errors.get(*name) else { continue };
-                let points: Vec<[f64; 2]> =
-                    curve.iter().filter_map(|p| Some([log10(p.seconds)?, log10(p.error.relative_rmse)?])).collect();
-                let color = theme::panel_color(&names, i);
-                let title = short(&names, name);
-                plot.line(Line::new(title, PlotPoints::from(points.clone())).color(color).width(1.5));
+            for Curve { title, panel, points, estimated } in curves {
+                let color = theme::panel_color(&names, panel);
+                let style = if estimated { LineStyle::dashed_dense() } else { LineStyle::Solid };
+                let line = Line::new(title.clone(), PlotPoints::from(points.clone()));
+                plot.line(line.color(color).width(1.5).style(style));
                 // Where there are many the line says it.
-                if points.len() <= 40 {
+                if points.len() <= 40 && !estimated {
                     plot.points(Points::new(title, PlotPoints::from(points)).color(color).radius(2.0));
                 }
             }
@@ -167,4 +190,38 @@ pub(super) fn areas(panes: &mut Panes, ui: &mut Ui) {
             plot.bar_chart(BarChart::new(*name, bars).color(color.gamma_multiply(0.7)));
         }
     });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::render::ErrorEstimate;
+    use crate::workbench::desk::EstimatePoint;
+
+    #[test]
+    fn estimated_curves_need_no_reference() {
+        let mut desk = Desk::default();
+        let at = |passes: u32, relative: f64| EstimatePoint {
+            seconds: f64::from(passes) / 10.0,
+            error: ErrorEstimate {
+                passes,
+                rmse: relative,
+                noise_rmse: relative,
+                bias_rmse: 0.0,
+                relative,
+                relative_bound: relative,
+            },
+        };
+        // A point without error has no place on a logarithmic axis.
+        desk.estimates.insert("integrated".into(), vec![at(10, 0.1), at(100, 0.01), at(1000, 0.0)]);
+        let curves = error_curves(&desk, &["regular", "integrated", "integrated"]);
+        assert_eq!(curves.len(), 1);
+        assert_eq!((curves[0].title.as_str(), curves[0].panel), ("integrated, estimated", 1));
+        assert!(curves[0].estimated);
+        let expected = [[0.0, -1.0], [1.0, -2.0]];
+        assert_eq!(curves[0].points.len(), 2);
+        for (p, e) in curves[0].points.iter().zip(expected) {
+            assert!((p[0] - e[0]).abs() < 1e-12 && (p[1] - e[1]).abs() < 1e-12, "{p:?}");
+        }
+    }
 }

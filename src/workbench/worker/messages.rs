@@ -6,6 +6,7 @@ use crate::render::pass::Pass;
 use crate::render::settings::RenderSettings;
 use crate::render::stats::{Bounded, Seconds, StoredCounts};
 use crate::render::view_pass::PartSeconds;
+use crate::render::{ErrorEstimate, StopRule, StoppedBy};
 use crate::scene::Scene;
 use std::sync::Arc;
 
@@ -20,8 +21,8 @@ pub struct Job {
     pub settings: RenderSettings,
     /// Estimators with their settings, as `multi_sampled:n=8,grid=cells`. Each of them is valid.
     pub estimators: Vec<String>,
-    /// Passes after which the worker rests.
-    pub passes: u32,
+    /// When the worker rests. Seconds are those of rendering, and the pass that runs is finished.
+    pub stop: StopRule,
 }
 
 /// What the window asks.
@@ -66,10 +67,12 @@ pub enum Event {
         /// Where the render stands.
         progress: Box<Progress>,
     },
-    /// The worker rests: all passes that were asked for are done.
+    /// The worker rests.
     Finished {
         /// Generation of the job.
         generation: u64,
+        /// Why.
+        why: StoppedBy,
     },
     /// The worker's thread has ended by a defect; the window may start another.
     Failed {
@@ -99,6 +102,8 @@ pub struct Progress {
     pub photon_seconds: Vec<f64>,
     /// Wall seconds of all passes by part.
     pub seconds: Seconds,
+    /// Estimated error of each estimator's image, if it was looked at after this pass.
+    pub estimates: Vec<Option<ErrorEstimate>>,
     /// Photons emitted in all passes.
     pub emitted: u64,
     /// Photons stored in all passes.
@@ -117,7 +122,7 @@ impl Event {
             | Self::TileDone { generation, .. }
             | Self::DraftDone { generation }
             | Self::PassDone { generation, .. }
-            | Self::Finished { generation } => Some(*generation),
+            | Self::Finished { generation, .. } => Some(*generation),
             Self::Failed { .. } => None,
         }
     }

@@ -4,11 +4,13 @@ use super::Wake;
 use super::gate::Gate;
 use super::messages::{Command, Event, Job, Progress, TileImage};
 use crate::estimate::{Estimator, registry};
-use crate::render::film::Rect;
+use crate::render::error_estimate::{ErrorEstimate, is_milestone};
+use crate::render::film::{Film, Rect};
 use crate::render::pass::Pass;
+use crate::render::stop::Standing;
 use crate::render::view_pass::PartSeconds;
 use crate::render::watch::{TileDone, Watch};
-use crate::render::{Renderer, Step};
+use crate::render::{Renderer, Step, StoppedBy};
 use crossbeam_channel::{Receiver, SendTimeoutError, Sender};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
@@ -95,8 +97,11 @@ impl Loop<'_> {
             let rect = Rect::whole(image.size);
             desk.send(Event::TileDone { generation: job.generation, rect, images, draft: false });
         }
+        let kept = estimates(renderer, |_| true);
+        let error = worst(&kept);
         if renderer.films().iter().any(|f| f.passes() > 0) {
-            desk.send(Event::PassDone { generation: job.generation, progress: Box::new(progress(renderer)) });
+            let progress = Box::new(progress(renderer, kept));
+            desk.send(Event::PassDone { generation: job.generation, progress });
         }
         let wants_draft = job.settings.photons > DRAFT_PHOTONS && renderer.passes() == 0;
         if wants_draft && !renderer.films().is_empty() {
@@ -105,23 +110,54 @@ impl Loop<'_> {
             }
             desk.send(Event::DraftDone { generation: job.generation });
         }
-        while !self.gate.is_stale(job.generation) && renderer.passes() < job.passes && !renderer.films().is_empty() {
+        let mut now = Standing { passes: renderer.passes(), seconds: renderer.seconds().sum(), next_pass: 0.0, error };
+        // Without an estimator there is nothing to wait for.
+        let nothing = renderer.films().is_empty().then_some(StoppedBy::Passes);
+        let why = loop {
+            if self.gate.is_stale(job.generation) {
+                return;
+            }
+            if let Some(why) = nothing.or_else(|| job.stop.verdict(&now)) {
+                break why;
+            }
             if renderer.step(&desk) == Step::Cancelled {
                 return;
             }
             self.gate.pass_ended();
-            desk.send(Event::PassDone { generation: job.generation, progress: Box::new(progress(renderer)) });
-        }
-        desk.send(Event::Finished { generation: job.generation });
+            let seconds = renderer.seconds().sum();
+            let all = estimates(renderer, is_milestone);
+            now = Standing {
+                passes: renderer.passes(),
+                seconds,
+                next_pass: seconds - now.seconds,
+                error: worst(&all).or(now.error),
+            };
+            let progress = Box::new(progress(renderer, all));
+            desk.send(Event::PassDone { generation: job.generation, progress });
+        };
+        desk.send(Event::Finished { generation: job.generation, why });
     }
 }
 
-fn progress(r: &Renderer) -> Progress {
+/// Estimated error of each image whose number of passes is `wanted`: it costs a look at each pixel.
+fn estimates(r: &Renderer, wanted: fn(u32) -> bool) -> Vec<Option<ErrorEstimate>> {
+    let of = |f: &Film| f.error_estimate(Rect::whole(f.size()), None);
+    r.films().iter().map(|f| wanted(f.passes()).then(|| of(f)).flatten()).collect()
+}
+
+/// The estimate of the image that is farthest from its end; None if one is missing.
+fn worst(estimates: &[Option<ErrorEstimate>]) -> Option<ErrorEstimate> {
+    let all: Option<Vec<ErrorEstimate>> = estimates.iter().copied().collect();
+    all?.into_iter().max_by(|a, b| a.relative_bound.total_cmp(&b.relative_bound))
+}
+
+fn progress(r: &Renderer, estimates: Vec<Option<ErrorEstimate>>) -> Progress {
     Progress {
         passes: r.films().iter().map(|f| f.passes()).collect(),
         estimator_seconds: r.estimator_seconds().to_vec(),
         photon_seconds: r.photon_seconds().to_vec(),
-        seconds: *r.seconds(),
+        seconds: r.seconds().within(0.0),
+        estimates,
         emitted: r.emitted(),
         stored: r.stored(),
         bounded: *r.bounded(),
