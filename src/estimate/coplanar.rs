@@ -163,6 +163,11 @@ impl Estimator for Coplanar {
         self.weight == Weight::Mean
     }
 
+    /// With the kernel's mean, where the photon's polygon holds all of its disc.
+    fn is_exact_mean(&self) -> bool {
+        self.weight == Weight::Mean && self.shape == Shape::Parallelogram
+    }
+
     fn weight(&self, photon: &MapPhoton, view: &View, _radius: f32) -> f64 {
         self.over_area(photon, view)
     }

@@ -44,6 +44,10 @@ impl Estimator for Integrated {
         true
     }
 
+    fn is_exact_mean(&self) -> bool {
+        true
+    }
+
     fn weight(&self, photon: &MapPhoton, view: &View, _radius: f32) -> f64 {
         over_area(photon, view)
     }

@@ -72,6 +72,12 @@ pub trait Estimator: Send + Sync {
     /// Whether its progressive render converges under `overlap`.
     fn is_consistent(&self) -> bool;
 
+    /// Whether it is the kernel's exact mean over the view footprint, so that the footprint of a whole pixel may take
+    /// the place of smaller ones that tile it.
+    fn is_exact_mean(&self) -> bool {
+        false
+    }
+
     /// Weight of one photon, 1/m²: its kernel's mean over the view footprint, over its area. Finite, not negative.
     fn weight(&self, photon: &MapPhoton, view: &View, radius: f32) -> f64;
 

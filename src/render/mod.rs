@@ -4,6 +4,7 @@ pub mod change;
 pub mod direct;
 pub mod error_estimate;
 pub mod film;
+pub mod flat_pixels;
 pub mod heatmap;
 pub mod inspect;
 pub mod pass;

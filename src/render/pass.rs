@@ -1,6 +1,7 @@
 //! One pass as a value: the photons, their maps, and everything needed to look at it again.
 
 use crate::estimate::Estimator;
+use crate::render::flat_pixels::FlatPixels;
 use crate::render::photon_pass::{Emitter, PhotonMaps, PhotonPass};
 use crate::render::plan::{Pilot, Plan, Slot};
 use crate::render::renderer::{area_factor, slots};
@@ -33,6 +34,8 @@ pub struct Pass {
     pub number: u32,
     /// Area of the footprints relative to the first pass, in `(0, 1]`.
     pub area_factor: f64,
+    /// Pixels that see one plane alone; None where nothing asks for them.
+    pub flat: Option<Arc<FlatPixels>>,
 }
 
 impl Pass {
@@ -61,7 +64,9 @@ impl Pass {
         let plan = Plan::new(&scene, &settings, slots, pilot.as_ref());
         let area_factor = area_factor(number);
         let (photons, maps) = (Arc::default(), PhotonMaps::default());
-        let mut pass = Self { scene, intersector, settings, plan, photons, maps, number, area_factor };
+        let flat = needs_flat_pixels(slots.iter().map(|s| s.estimator), &plan, number)
+            .then(|| Arc::new(FlatPixels::new(&scene, &intersector, settings.size)));
+        let mut pass = Self { scene, intersector, settings, plan, photons, maps, number, area_factor, flat };
         if pass.plan.needs_photons() {
             pass.photons = Arc::new(pass.emitter().run(u64::from(number), cancelled));
         }
@@ -95,6 +100,7 @@ impl Pass {
             },
             maps: &self.maps,
             pass: self.number,
+            flat: self.flat.as_deref(),
             area_factor: self.area_factor as f32,
             tile: TILE,
         }
@@ -104,6 +110,16 @@ impl Pass {
     pub fn scale(&self) -> f32 {
         scale_of(&self.settings, self.area_factor)
     }
+}
+
+/// Whether pass `number` of these estimators asks for the flat pixels: view rays are jittered, and photons are looked up
+/// by an exact mean over footprints that view rays carry.
+pub(super) fn needs_flat_pixels<'a>(
+    mut estimators: impl Iterator<Item = &'a dyn Estimator>,
+    plan: &Plan,
+    number: u32,
+) -> bool {
+    number > 0 && plan.needs_photons() && plan.view_differentials && estimators.any(|e| e.is_exact_mean())
 }
 
 /// Factor on the axes of footprints whose area is `area_factor` of the first pass's.

@@ -4,7 +4,8 @@ use crate::estimate::{Estimator, Lookup};
 use crate::render::change::{PhotonStore, World, film_is_kept, photons_are_kept};
 use crate::render::error_estimate::ErrorEstimate;
 use crate::render::film::{Film, Rect};
-use crate::render::pass::{Pass, scale_of};
+use crate::render::flat_pixels::FlatPixels;
+use crate::render::pass::{Pass, needs_flat_pixels, scale_of};
 use crate::render::photon_pass::{Emitter, PhotonMaps, PhotonPass};
 use crate::render::plan::{Pilot, Plan, Slot};
 use crate::render::settings::{Gather, PlanMode, RenderSettings};
@@ -55,6 +56,8 @@ pub struct Renderer {
     pilot: Option<Pilot>,
     plan_is_stale: bool,
     films: Vec<Film>,
+    /// Pixels that see one plane alone, once a pass has asked for them.
+    flat: Option<Arc<FlatPixels>>,
     /// The last pass.
     last: Option<Arc<Pass>>,
     photons: PhotonStore,
@@ -112,6 +115,7 @@ impl Renderer {
             plan,
             pilot: None,
             plan_is_stale: true,
+            flat: None,
             last: None,
             photons: PhotonStore::default(),
             seconds: Seconds { bvh, ..Default::default() },
@@ -154,6 +158,9 @@ impl Renderer {
             self.seconds.bvh = start.elapsed().as_secs_f64();
         }
         let same_world = World::of(&scene) == World::of(&self.scene);
+        if !same_world {
+            self.flat = None;
+        }
         let same_photons = same_world && photons_are_kept(&self.settings, &settings);
         if !same_photons {
             self.photons.clear();
@@ -294,11 +301,26 @@ impl Renderer {
             let next = next_area(self.areas[self.areas.len() - 1], self.areas.len() as u32);
             self.areas.push(next);
         }
+        self.find_flat_pixels(number);
         let start = Instant::now();
         let area = self.areas[number as usize];
         let pass = self.pass_of(self.settings.clone(), self.plan.clone(), photons, number, area);
         let map_build = start.elapsed().as_secs_f64();
         (!watch.cancelled()).then_some((pass, photon_trace, map_build))
+    }
+
+    /// Sees to it that the flat pixels are there if pass `number` asks for them; their time is that of view rays.
+    fn find_flat_pixels(&mut self, number: u32) {
+        let size = self.settings.size;
+        let there = self.flat.as_ref().is_some_and(|f| f.is_of(&self.scene.camera, size));
+        if !there && needs_flat_pixels(self.estimators.iter().map(AsRef::as_ref), &self.plan, number) {
+            let start = Instant::now();
+            self.flat = Some(Arc::new(FlatPixels::new(&self.scene, &self.intersector, size)));
+            let seconds = start.elapsed().as_secs_f64();
+            self.seconds.view_trace += seconds;
+            let exact = self.estimators.iter().zip(&mut self.estimator_seconds).filter(|(e, _)| e.is_exact_mean());
+            exact.for_each(|(_, s)| s.view_trace += seconds);
+        }
     }
 
     fn pass_of(
@@ -311,7 +333,8 @@ impl Renderer {
     ) -> Arc<Pass> {
         let maps = PhotonMaps::new(&self.scene, &plan, &photons.stored, scale_of(&settings, area_factor));
         let (scene, intersector) = (Arc::clone(&self.scene), Arc::clone(&self.intersector));
-        Arc::new(Pass { scene, intersector, settings, plan, photons, maps, number, area_factor })
+        let flat = self.flat.as_ref().map(Arc::clone).filter(|f| number > 0 && f.is_of(&scene.camera, settings.size));
+        Arc::new(Pass { scene, intersector, settings, plan, photons, maps, number, area_factor, flat })
     }
 
     /// Views of a pass by the estimators `now`; None if cancelled.

@@ -1,6 +1,6 @@
 //! View paths: from the camera, by specular surfaces, to the diffuse surfaces where radiance is estimated.
 
-use crate::estimate::View;
+use crate::estimate::{Estimator, View};
 use crate::math::rgb::{Rgb, mean};
 use crate::math::sequence::Sequence;
 use crate::photons::map::Query;
@@ -19,10 +19,24 @@ use std::f32::consts::FRAC_1_PI;
 pub struct ViewHit {
     /// What estimators see.
     pub view: View,
+    /// The part of the pixel that an exact mean may take instead of the ray's own cell; see
+    /// [`crate::render::flat_pixels`].
+    pub flat: Option<Query>,
     /// Radiance at the camera for unit irradiance here: throughput times ρ/π, 1/sr.
     pub weight: Rgb,
     /// Index of the pixel in its tile.
     pub pixel: u32,
+}
+
+impl ViewHit {
+    /// The hit as that estimator sees it.
+    #[inline]
+    pub fn seen_by(&self, estimator: &dyn Estimator) -> View {
+        match self.flat {
+            Some(query) if estimator.is_exact_mean() => View { query, ..self.view },
+            _ => self.view,
+        }
+    }
 }
 
 /// Counts that only view paths have.
@@ -165,6 +179,7 @@ impl ViewTracer<'_> {
                                 },
                                 direction: v,
                             },
+                            flat: None,
                             weight,
                             pixel,
                         });

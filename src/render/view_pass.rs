@@ -7,6 +7,7 @@ use crate::math::sequence::{Sampling, Sequence};
 use crate::photons::kd_tree::Nearest;
 use crate::photons::{PhotonKind, PhotonMap};
 use crate::render::film::{Image, Rect};
+use crate::render::flat_pixels::FlatPixels;
 use crate::render::photon_pass::PhotonMaps;
 use crate::render::plan::Slot;
 use crate::render::settings::Gather;
@@ -73,6 +74,8 @@ pub struct ViewPass<'a> {
     pub maps: &'a PhotonMaps,
     /// Number of the pass, from 0; from 1 on rays are jittered.
     pub pass: u32,
+    /// Where an exact mean may take more of the pixel than the ray's cell.
+    pub flat: Option<&'a FlatPixels>,
     /// Area of footprints relative to the first pass.
     pub area_factor: f32,
     /// Pixels along a tile's side, at least 1. It decides no pixel.
@@ -273,6 +276,7 @@ impl ViewPass<'_> {
                 let (direction, differential) = camera.ray(px, py, size, half);
                 let ray = Ray { origin: camera.position, direction };
                 recorder.ray(cell);
+                let before = scratch.hits.len();
                 *sum += t.trace(
                     ray,
                     differential,
@@ -284,6 +288,13 @@ impl ViewPass<'_> {
                     counts,
                     recorder,
                 );
+                if let (Some(flat), Some(at), 1) = (self.flat, jitter, n)
+                    && let [hit] = &mut scratch.hits[before..]
+                {
+                    let parts = parts_of_pass(self.pass) as f32;
+                    let low = at.map(|v| (v * parts).floor() / parts);
+                    hit.flat = flat.part([x, y], low, low.map(|v| v + 1.0 / parts), &hit.view.query);
+                }
             }
         }
         base
@@ -318,7 +329,7 @@ impl ViewPass<'_> {
                 let mut irradiance = Rgb::ZERO;
                 for (map, &(from, to, radius)) in self.maps.all().zip(spans.by_ref()) {
                     let found = Gathered { photons: map.photons(), indices: &scratch.indices[from..to], radius };
-                    irradiance += slot.estimator.irradiance(&found, &hit.view);
+                    irradiance += slot.estimator.irradiance(&found, &hit.seen_by(slot.estimator));
                 }
                 sums[hit.pixel as usize] += irradiance.as_dvec3() * hit.weight.as_dvec3();
             }
@@ -361,14 +372,15 @@ impl ViewPass<'_> {
                 scratch.indices.clear();
                 let radius = self.gather(map, slot, hit, scratch);
                 let gathered = Gathered { photons: map.photons(), indices: &scratch.indices, radius };
-                visit(hit, &scratch.hits[hit], kind, &gathered);
+                let seen = ViewHit { view: scratch.hits[hit].seen_by(slot.estimator), ..scratch.hits[hit] };
+                visit(hit, &seen, kind, &gathered);
             }
         }
     }
 
     /// Appends the photons of one hit to the scratch's indices; returns the radius of the disc, if it asks for one.
     fn gather(&self, map: &PhotonMap, slot: &Slot, hit: usize, scratch: &mut Scratch) -> f32 {
-        let query = scratch.hits[hit].view.query;
+        let query = scratch.hits[hit].seen_by(slot.estimator).query;
         let (indices, heap) = (&mut scratch.indices, &mut scratch.heap);
         let k = self.tracer.settings.k;
         match (slot.estimator.lookup(), slot.gather) {
@@ -398,6 +410,12 @@ pub(super) fn cells_of_pass(pass: u32) -> u32 {
         next *= 16;
     }
     cells
+}
+
+/// Parts along a flat pixel's side of which a pass takes one: the whole pixel up to pass 255, 2 up to pass 4095, and so
+/// on, so that in the end the curvature of its outline does not count.
+fn parts_of_pass(pass: u32) -> u32 {
+    cells_of_pass(pass / 256)
 }
 
 /// Sums beyond f32 become its largest number, so that no infinity reaches an image.
