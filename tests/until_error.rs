@@ -86,3 +86,23 @@ fn light_without_photons() {
     let e = renderer.error_estimate().expect("enough passes");
     assert!(e.relative < 0.01 && e.relative_bound < 0.02, "{e:?}");
 }
+
+/// The estimate decides how many passes an image has, so its bits have to be the same on any number of threads.
+#[test]
+fn threads_change_no_bit() {
+    let estimate = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
+        pool.install(|| {
+            let scene = open("ring").expect("built in");
+            let flags = RenderFile { photons: Some(3000), ..Default::default() };
+            let settings = RenderSettings::new(&scene, &flags, Some([67, 45]), 1).expect("valid");
+            let mut renderer = Renderer::new(scene.into(), settings, vec![estimator("regular").expect("registered")]);
+            (0..20).for_each(|_| _ = renderer.step(&Silent));
+            let variance = renderer.films()[0].variance().expect("enough passes");
+            let e = renderer.error_estimate().expect("enough passes");
+            let bits = [e.rmse, e.noise_rmse, e.bias_rmse, e.relative, e.relative_bound].map(f64::to_bits);
+            (bits, variance.pixels.iter().map(|p| p.to_array().map(f32::to_bits)).collect::<Vec<_>>())
+        })
+    };
+    assert_eq!(estimate(1), estimate(3));
+}

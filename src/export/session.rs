@@ -438,6 +438,7 @@ mod tests {
     fn sessions_come_back_as_they_were_written() {
         let mut session = Session::of("ring");
         session.size = Some([64, 48]);
+        (session.until_error, session.seconds) = (Some(0.01), Some(90.0));
         session.crop = Some([1, 2, 3, 4]);
         session.pins = vec![[5, 6], [7, 8]];
         session.overlays = vec!["photons".into()];
@@ -470,6 +471,8 @@ mod tests {
             ("session = 2\nscene = \"ring\"", "s.toml:1: session"),
             ("session = 1\nscene = \"ring\"\nsize = 4", "s.toml:3"),
             ("session = 1\nscene = \"ring\"\ncolour = 4", "colour"),
+            ("session = 1\nscene = \"ring\"\nuntil_error = 0", "s.toml:3: until_error"),
+            ("session = 1\nscene = \"ring\"\nseconds = nan", "s.toml:3: seconds"),
             ("session = 1\nscene = \"ring\"\n[[panels]]\nestimator = \"sharp\"", "sharp"),
         ] {
             let error = Session::parse(Path::new("s.toml"), text).expect_err(text).to_string();

@@ -3,9 +3,9 @@
 use super::window::{Window, fresh, open, same_as_fresh, same_bits, settle, small};
 use cusp::estimate::registry;
 use cusp::export::session::{Panel, Session};
-use cusp::render::RenderSettings;
 use cusp::render::film::{Image, Rect};
 use cusp::render::tiles::tiles;
+use cusp::render::{RenderSettings, StoppedBy};
 use cusp::workbench::actions::Action;
 use cusp::workbench::analysis::no_wake;
 use cusp::workbench::gallery::Gallery;
@@ -217,6 +217,36 @@ fn old_events_are_dropped() {
         finished
     });
     assert_eq!(tiles_seen, 64);
+}
+
+/// The window rests at an error or a time, says which, and goes on when the limit is taken away.
+#[test]
+fn the_window_rests_at_its_limits() {
+    let mut session = small("plane", 1);
+    session.render.light = Some("direct".into());
+    session.passes = 24;
+    // Direct light of a point is without noise, so any error will do.
+    session.until_error = Some(0.5);
+    let mut window = open(session);
+    let passes = |w: &Window| w.state().render().progress.as_ref().expect("done").passes.clone();
+    assert_eq!((passes(&window), window.state().render().stopped_by), (vec![16], Some(StoppedBy::Error)));
+    let estimates = window.state().desk().estimates.values().next().expect("one panel").clone();
+    let seen: Vec<u32> = estimates.iter().map(|e| e.error.passes).collect();
+    assert_eq!(seen, [12, 13, 14, 15, 16]);
+    window.state_mut().session_mut().until_error = None;
+    settle(&mut window);
+    assert_eq!((passes(&window), window.state().render().stopped_by), (vec![24], Some(StoppedBy::Passes)));
+    same_as_fresh(&window);
+    // Taken back, the limit is reached already.
+    window.state_mut().run(Action::Undo);
+    settle(&mut window);
+    assert_eq!(window.state().session().until_error, Some(0.5));
+    assert_eq!((passes(&window), window.state().render().stopped_by), (vec![24], Some(StoppedBy::Error)));
+    window.state_mut().session_mut().seconds = Some(1e-9);
+    window.state_mut().session_mut().until_error = None;
+    window.state_mut().session_mut().seed = 7;
+    settle(&mut window);
+    assert_eq!((passes(&window), window.state().render().stopped_by), (vec![1], Some(StoppedBy::Seconds)));
 }
 
 /// A worker ends when its window is gone, however many jobs wait for it and whether or not its events are taken.
