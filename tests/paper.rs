@@ -149,7 +149,7 @@ fn printed_ratios_are_quotients_of_printed_seconds() {
 fn figure_19_accounts_for_all_of_the_time() {
     let (json, folder) = small("figure-19", &["--repeats", "1"]);
     files_are_whole(&json, folder.path());
-    assert_eq!(csv_rows(folder.path(), "figure-19"), 14);
+    assert_eq!(csv_rows(folder.path(), "figure-19"), 12);
     assert_eq!(json["printed"]["share"], 0.915);
     for profile in json["profiles"].as_array().expect("profiles") {
         let steps = profile["steps"].as_array().expect("steps");

@@ -177,8 +177,8 @@ impl Frame {
         // Each edge m + s e, -1 <= s <= 1, by m × e: its distance times its half-length, positive if the centre of the
         // disc lies on the side of the polygon.
         let crosses = [cxa + area, cxb + area, area - cxa, area - cxb];
-        let clear = |k: usize| crosses[k] * crosses[k] >= rho2 * if k % 2 == 0 { aa } else { bb };
-        let clear = [clear(0), clear(1), clear(2), clear(3)];
+        let clear = |k: usize, ee: f64| crosses[k] * crosses[k] >= rho2 * ee;
+        let clear = [clear(0, aa), clear(1, bb), clear(2, aa), clear(3, bb)];
         if (0..4).any(|k| clear[k] && crosses[k] < 0.0) {
             return 0.0;
         }

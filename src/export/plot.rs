@@ -81,7 +81,7 @@ const FAINT: [u8; 3] = [110; 3];
 const AXES: [u32; 2] = [620, 470];
 const HEADING: u32 = 58;
 const LINE: u32 = 20;
-const LEGEND: u32 = 330;
+const LEGEND: u32 = 400;
 /// Height of the heading of a pair of axes, pixels.
 const TITLE: u32 = 30;
 const FAMILY: &str = "cusp";

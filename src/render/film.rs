@@ -26,7 +26,7 @@ impl Film {
     /// another. It has no error estimate, whose own sums are not among them.
     pub fn going_on(size: [u32; 2], sum: Vec<DVec3>, passes: u32) -> Option<Self> {
         let fits = sum.len() as u64 == u64::from(size[0]) * u64::from(size[1]);
-        fits.then(|| Self { size, sum, groups: None, passes })
+        fits.then_some(Self { size, sum, groups: None, passes })
     }
 
     /// The sum of the finished passes for each pixel, row by row, W/(m² sr).

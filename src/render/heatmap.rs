@@ -276,7 +276,7 @@ fn squared(photon: &MapPhoton, weight: f64, hit: &ViewHit, rays: f64) -> f64 {
 mod tests {
     use super::*;
     use crate::estimate::registry::{estimator, estimators};
-    use crate::render::inspect::inspect;
+    use crate::render::inspect::{PhotonRow, inspect};
     use crate::render::renderer::slots;
     use crate::render::{RenderSettings, Renderer};
     use crate::scene::open;
@@ -333,7 +333,8 @@ mod tests {
                     assert!((at(Heatmap::StandardError) - error).abs() <= 1e-5 * error);
                     let longest = rows.iter().map(|r| r.footprint[0].length().max(r.footprint[1].length()));
                     assert!(longest.fold(0.0, f32::max) <= at(Heatmap::LargestFootprint) * 1.000_01);
-                    let away = rows.iter().map(|r| (r.position - inspection.hits[r.hit].view.query.center).length());
+                    let center = |r: &PhotonRow| inspection.hits[r.hit].seen_by(list[e].as_ref()).query.center;
+                    let away = rows.iter().map(|r| (r.position - center(r)).length());
                     assert!(away.fold(0.0, f32::max) <= at(Heatmap::GatherRadius) * 1.000_01);
                     lit += rows.len();
                 }

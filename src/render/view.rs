@@ -32,10 +32,16 @@ impl ViewHit {
     /// The hit as that estimator sees it.
     #[inline]
     pub fn seen_by(&self, estimator: &dyn Estimator) -> View {
-        match self.flat {
-            Some(query) if estimator.is_exact_mean() => View { query, ..self.view },
-            _ => self.view,
-        }
+        seen_by(self.view, self.flat, estimator)
+    }
+}
+
+/// What an estimator sees at a hit of the ray's own `view` in a pixel whose part `flat` may take its place.
+#[inline]
+pub(super) fn seen_by(view: View, flat: Option<Query>, estimator: &dyn Estimator) -> View {
+    match flat {
+        Some(query) if estimator.is_exact_mean() => View { query, ..view },
+        _ => view,
     }
 }
 

@@ -12,12 +12,13 @@ pub use situation::Situation;
 
 use crate::estimate::{Estimator, View};
 use crate::math::rgb::Rgb;
+use crate::photons::map::Query;
 use crate::photons::{MapPhoton, PhotonKind};
 use crate::render::film::Rect;
 use crate::render::pass::Pass;
 use crate::render::plan::{Plan, Slot};
 use crate::render::renderer::slots;
-use crate::render::view::{ViewCounts, ViewTracer};
+use crate::render::view::{ViewCounts, ViewTracer, seen_by};
 use crate::render::view_pass::{Scratch, ViewPass};
 use crate::render::watch::Silent;
 use glam::{DVec3, Vec3};
@@ -61,6 +62,9 @@ pub struct EstimatorValue {
 pub struct InspectedHit {
     /// Hit point, normal, view footprint and direction.
     pub view: View,
+    /// The part of the pixel that an exact mean takes in its place; None in the first pass, and where the pixel sees more
+    /// than one plane.
+    pub flat: Option<Query>,
     /// Radiance at the camera for unit irradiance here: throughput times ρ/π, 1/sr, before the mean over rays.
     pub weight: Rgb,
     /// View rays across and down the pixel, in the grid that the ray belongs to.
@@ -73,6 +77,13 @@ pub struct InspectedHit {
     pub material: u32,
     /// Discs that the k nearest fill, for estimators that ask for one.
     pub discs: Vec<Disc>,
+}
+
+impl InspectedHit {
+    /// The hit as that estimator sees it.
+    pub fn seen_by(&self, estimator: &dyn Estimator) -> View {
+        seen_by(self.view, self.flat, estimator)
+    }
 }
 
 /// The disc of one density estimate at a hit.
@@ -244,6 +255,7 @@ impl Account<'_> {
             };
             self.hits.push(InspectedHit {
                 view: hit.view,
+                flat: hit.flat,
                 weight: hit.weight,
                 rays_per_axis: n,
                 cell: v.cell,
@@ -283,7 +295,7 @@ impl Account<'_> {
         let query = &at.view.query;
         let light = photon.power.as_dvec3() * at.weight.as_dvec3() / f64::from(at.rays_per_axis * at.rays_per_axis);
         let samples = self.slots.iter().map(|s| match s.estimator.rays_per_axis() == at.rays_per_axis {
-            true => s.estimator.construction(photon, &at.view).points_inside(),
+            true => s.estimator.construction(photon, &at.seen_by(s.estimator)).points_inside(),
             false => 0,
         });
         PhotonRow {
