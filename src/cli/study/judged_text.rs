@@ -48,7 +48,11 @@ fn curves(curves: &[Curve]) -> Table {
             last.relative_rmse.map_or("-".into(), |e| format!("{:.2} to {:.2}", 100.0 * e.low, 100.0 * e.high)),
             percent(parts.and_then(|p| p.relative_bias)),
             percent(parts.map(|p| p.relative_noise)),
-            curve.convergence.map_or("-".into(), |c| format!("{:.2} ± {:.2}", c.exponent, c.standard_error)),
+            // Two points lie on a line, whatever they are.
+            curve
+                .convergence
+                .filter(|c| c.points > 2)
+                .map_or("-".into(), |c| format!("{:.2} ± {:.2}", c.exponent, c.standard_error)),
             if curve.consistent { "yes" } else { "no" }.into(),
         ]);
     }
