@@ -17,6 +17,16 @@ pub enum Gather {
     Overlap,
 }
 
+impl Gather {
+    /// Its name in flags and files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Knn => "knn",
+            Self::Overlap => "overlap",
+        }
+    }
+}
+
 /// Which light an image shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]

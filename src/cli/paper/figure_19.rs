@@ -11,7 +11,6 @@ use crate::cli::paper::methods::GATHERS;
 use crate::cli::paper::output::{Done, Head};
 use crate::cli::paper::printed;
 use crate::cli::paper::spread::Spread;
-use crate::cli::paper::table_1::gather_name;
 use crate::cli::paper::test_case::TestCase;
 use crate::cli::progress::{bar, interrupted};
 use crate::cli::table::Table;
@@ -111,7 +110,7 @@ fn profile(case: &TestCase, gather: Gather, repeats: u32) -> Result<Profile, Fai
     let slot = Slot { estimator: &coplanar, gather };
     let (view, maps) = (case.pass.view(), &case.pass.maps);
     let all = tiles(case.whole());
-    let what = format!("coplanar, {}", gather_name(gather));
+    let what = format!("coplanar, {}", gather.name());
     let progress = bar(all.len() as u64 * u64::from(repeats), &what, case.hidden());
     let mut seconds = vec![[0.0; STEPS.len()]; repeats as usize];
     let (mut photons, mut clipped) = (0, 0);
@@ -195,7 +194,7 @@ fn timed(tile: &GatheredTile, maps: &PhotonMaps, f: impl Fn(&MapPhoton, &View) -
 }
 
 fn table(profiles: &[Profile]) -> String {
-    let heading = profiles.iter().flat_map(|p| [format!("{} s", gather_name(p.gather)), "share".into(), String::new()]);
+    let heading = profiles.iter().flat_map(|p| [format!("{} s", p.gather.name()), "share".into(), String::new()]);
     let mut table = Table::new(std::iter::once("step".to_owned()).chain(heading));
     let cells = |seconds: &Spread, share: &Spread| {
         let percent = |x: f64| format!("{:.1}", 100.0 * x);
@@ -223,7 +222,7 @@ fn csv(profiles: &[Profile]) -> String {
             let _ = writeln!(
                 csv,
                 "{},{},{:.6},{:.6},{:.6},{:.6},{:.6},{:.6}",
-                gather_name(p.gather),
+                p.gather.name(),
                 step.step,
                 s.median,
                 s.least,

@@ -130,7 +130,7 @@ fn table(rows: &[Timed]) -> String {
         let printed = r.printed.as_ref();
         table.row([
             r.estimator.clone(),
-            gather_name(r.gather).into(),
+            r.gather.name().into(),
             printed.map_or("-".into(), |p| format!("{:.3}", p.printed.seconds)),
             printed.map_or("-".into(), |p| ratio(p.ratio_to_regular)),
             format!("{:.3}", r.seconds_spread.median),
@@ -140,14 +140,6 @@ fn table(rows: &[Timed]) -> String {
         ]);
     }
     table.text()
-}
-
-/// `knn` or `overlap`.
-pub fn gather_name(gather: Gather) -> &'static str {
-    match gather {
-        Gather::Knn => "knn",
-        Gather::Overlap => "overlap",
-    }
 }
 
 fn csv(rows: &[Timed]) -> String {
@@ -162,7 +154,7 @@ fn csv(rows: &[Timed]) -> String {
             csv,
             "\"{}\",{},{},{},{:.6},{:.6},{:.6},{:.6},{:.6},{:.6}",
             r.estimator,
-            gather_name(r.gather),
+            r.gather.name(),
             number(p.map(|p| p.printed.seconds)),
             number(p.map(|p| p.ratio_to_regular)),
             s.median,
@@ -199,7 +191,7 @@ fn chart(rows: &[Timed], head: &Head) -> Chart {
             let color = if r.gather == Gather::Knn { colors[1] } else { colors[2] };
             let x = r.ratio_to_regular;
             let number = format!("{:.2} ({:.2} to {:.2})", x.median, x.least, x.most);
-            bars.push(single(&format!("    {}", gather_name(r.gather)), x.median, color, number));
+            bars.push(single(&format!("    {}", r.gather.name()), x.median, color, number));
         }
     }
     Chart {

@@ -41,7 +41,7 @@ impl Given {
         let compared = match self {
             Self::Reference(r) => {
                 let judge = Judge::new(r, flags.crop, 0.0).map_err(|e| Failure::Call(format!("--crop: {e}")))?;
-                judge.fitted(Image::black(size)).map_err(|e| {
+                judge.fitted(&Image::black(size)).map_err(|e| {
                     Failure::Call(format!("--size: {e}; give such a size, another --reference, or --own-reference"))
                 })?;
                 r.image.size

@@ -102,10 +102,7 @@ impl<'a> StudyReport<'a> {
         for curve in self.curves {
             let s = &curve.setting;
             let (id, own) = s.estimator.split_once(':').unwrap_or((&s.estimator, ""));
-            let gather = match s.gather {
-                crate::render::Gather::Knn => "knn",
-                crate::render::Gather::Overlap => "overlap",
-            };
+            let gather = s.gather.name();
             let k = s.k.map_or(String::new(), |k| k.to_string());
             let scale = s.footprint_scale.map_or(String::new(), |f| f.to_string());
             for p in &curve.points {

@@ -10,6 +10,7 @@ use crate::measure::image_file;
 use crate::measure::metrics::{self, ErrorMetrics, Mask};
 use crate::render::film::Image;
 use crate::scene::built_in;
+use std::borrow::Cow;
 use std::path::Path;
 
 /// An image to compare with, and where it counts.
@@ -124,24 +125,28 @@ impl Reference {
         (mean > 0.0).then(|| mse.sqrt() / mean)
     }
 
+    /// An image in the size of this reference: itself, or averaged down if it is a whole number of times as large.
+    ///
+    /// # Errors
+    /// Any other size.
+    pub fn fitted<'i>(&self, image: &'i Image) -> Result<Cow<'i, Image>, String> {
+        let ([a, b], [w, h]) = (image.size, self.image.size);
+        let fits = |a: u32, b: u32| a >= b && a.is_multiple_of(b);
+        if image.size == self.image.size {
+            Ok(Cow::Borrowed(image))
+        } else if fits(a, w) && fits(b, h) {
+            Ok(Cow::Owned(image.resampled(self.image.size)))
+        } else {
+            Err(format!("the image of {a}x{b} pixels is no multiple of the reference's {w}x{h}"))
+        }
+    }
+
     /// Error of an image against this reference. An image that is a whole number of times as large is averaged down.
     ///
     /// # Errors
     /// If the sizes do not fit, or no pixel counts.
     pub fn error_of(&self, image: &Image) -> Result<ErrorMetrics, String> {
-        let [w, h] = self.image.size;
-        let fits = |a: u32, b: u32| a >= b && a.is_multiple_of(b);
-        if !(fits(image.size[0], w) && fits(image.size[1], h)) {
-            return Err(format!(
-                "the image of {}x{} pixels is no multiple of the reference's {w}x{h}",
-                image.size[0], image.size[1]
-            ));
-        }
-        if image.size == self.image.size {
-            metrics::compare(image, &self.image, &self.mask)
-        } else {
-            metrics::compare(&image.resampled(self.image.size), &self.image, &self.mask)
-        }
+        metrics::compare(&*self.fitted(image)?, &self.image, &self.mask)
     }
 }
 

@@ -2,6 +2,7 @@
 
 use crate::measure::flip::{FlipView, flip};
 use crate::measure::metrics::compare;
+use crate::measure::reference::noise::mean_over;
 use crate::measure::study::curve::{BiasAndVariance, Spread};
 use crate::measure::study::pareto::{Best, best_of_budgets};
 use crate::measure::study::power_law::PowerLaw;
@@ -12,6 +13,7 @@ use crate::measure::{Mask, Reference};
 use crate::render::film::{Image, Rect};
 use glam::DVec3;
 use rayon::prelude::*;
+use std::borrow::Cow;
 
 /// How often the reference's noise an error must be, both squared, to be told from it: the noise adds to the squares.
 pub const TOLD_FROM_NOISE: f64 = 2.0;
@@ -32,14 +34,10 @@ impl<'a> Judge<'a> {
     /// A crop that leaves no pixel.
     pub fn new(reference: &'a Reference, crop: Option<Rect>, exposure: f32) -> Result<Self, String> {
         let mask = crop.map_or_else(|| reference.mask.clone(), |c| reference.mask.within(c));
-        let counted = || reference.image.pixels.iter().zip(&mask.counts).filter(|(_, c)| **c);
-        let pixels = counted().count();
-        if pixels == 0 {
-            return Err("no pixel of the reference counts; give another mask or crop".into());
-        }
-        let sum: f64 = counted().map(|(p, _)| p.as_dvec3().element_sum()).sum();
+        let mean =
+            mean_over(&reference.image, &mask).ok_or("no pixel of the reference counts; give another mask or crop")?;
         let noise_mse = reference.noise_mse(&mask);
-        Ok(Self { reference, mean: sum / (3.0 * pixels as f64), mask, noise_mse, exposure })
+        Ok(Self { reference, mean, mask, noise_mse, exposure })
     }
 
     /// Mean squared noise of the reference over the pixels that count, (W/(m² sr))²; None if unknown.
@@ -72,23 +70,12 @@ impl<'a> Judge<'a> {
         self.noise_mse.is_none_or(|noise| mse >= TOLD_FROM_NOISE * noise)
     }
 
-    /// An image in the size of the reference; one that is a whole number of times as large is averaged down.
+    /// An image in the size of the reference, as [`Reference::fitted`].
     ///
     /// # Errors
-    /// Any other size.
-    pub fn fitted(&self, image: Image) -> Result<Image, String> {
-        let size = self.reference.image.size;
-        let fits = |a: u32, b: u32| a >= b && a.is_multiple_of(b);
-        if image.size == size {
-            Ok(image)
-        } else if fits(image.size[0], size[0]) && fits(image.size[1], size[1]) {
-            Ok(image.resampled(size))
-        } else {
-            Err(format!(
-                "images of {}x{} pixels are no multiple of the reference's {}x{}",
-                image.size[0], image.size[1], size[0], size[1]
-            ))
-        }
+    /// A size that does not fit.
+    pub fn fitted(&self, image: &Image) -> Result<Image, String> {
+        self.reference.fitted(image).map(Cow::into_owned)
     }
 
     /// All metrics of a fitted image.
@@ -202,7 +189,7 @@ pub fn smallest_error(
     let errors: Result<Vec<f64>, String> = all
         .par_iter()
         .map(|&(task, passes)| {
-            let fitted = judge.fitted(image(task, passes)?)?;
+            let fitted = judge.fitted(&image(task, passes)?)?;
             let mse = compare(&fitted, &judge.reference.image, &judge.mask)?.mse;
             Ok(judge.relative(mse - judge.noise_mse.unwrap_or(0.0)))
         })
@@ -230,7 +217,7 @@ impl Group {
         let mut errors = Vec::new();
         for (record, _) in &at {
             let task = Task { setting: record.setting, seed: record.seed };
-            let fitted = judge.fitted(image(task, passes)?)?;
+            let fitted = judge.fitted(&image(task, passes)?)?;
             errors.push(judge.error(&fitted)?);
             images.push(fitted);
         }
@@ -314,8 +301,8 @@ mod tests {
         let judge = Judge::new(&r, Some(Rect { x: 1, y: 0, width: 1, height: 2 }), 0.0).expect("pixels");
         assert_eq!(judge.pixels(), 2);
         let large = Image { size: [4, 4], pixels: vec![Vec3::ONE; 16] };
-        assert_eq!(judge.fitted(large).expect("fits").size, [2, 2]);
-        assert!(judge.fitted(Image::black([3, 2])).is_err());
+        assert_eq!(judge.fitted(&large).expect("fits").size, [2, 2]);
+        assert!(judge.fitted(&Image::black([3, 2])).is_err());
         assert!(Judge::new(&r, Some(Rect { x: 5, y: 0, width: 1, height: 1 }), 0.0).is_err());
     }
 }

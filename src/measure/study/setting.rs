@@ -58,19 +58,11 @@ impl Setting {
 
     /// All of it but the estimator, as in `gather=knn,k=50,photons=200000`.
     pub fn rest(&self) -> String {
-        let mut parts = vec![format!("gather={}", gather_name(self.gather))];
+        let mut parts = vec![format!("gather={}", self.gather.name())];
         parts.extend(self.k.map(|k| format!("k={k}")));
         parts.extend(self.footprint_scale.map(|s| format!("footprint_scale={s}")));
         parts.push(format!("photons={}", self.photons));
         parts.join(",")
-    }
-}
-
-/// The name of a gather on the command line.
-fn gather_name(gather: Gather) -> &'static str {
-    match gather {
-        Gather::Knn => "knn",
-        Gather::Overlap => "overlap",
     }
 }
 
@@ -83,7 +75,7 @@ pub fn labels(settings: &[Setting]) -> Vec<String> {
         used.iter().any(|u| *u != used[0])
     };
     let photons = differs(&|s| s.photons.to_string());
-    let gathers = among(&|s| s.footprint_scale.map(|_| gather_name(s.gather).to_owned()));
+    let gathers = among(&|s| s.footprint_scale.map(|_| s.gather.name().to_owned()));
     let k = among(&|s| s.k.map(|k| k.to_string()));
     let scale = among(&|s| s.footprint_scale.map(|f| f.to_string()));
     settings
@@ -92,7 +84,7 @@ pub fn labels(settings: &[Setting]) -> Vec<String> {
             let alone = !settings.iter().any(|o| o.id() == s.id() && o.estimator != s.estimator);
             let mut label = if alone { s.id().to_owned() } else { s.estimator.clone() };
             if gathers && s.footprint_scale.is_some() {
-                label.push_str(&format!(" {}", gather_name(s.gather)));
+                label.push_str(&format!(" {}", s.gather.name()));
             }
             if let Some(n) = s.k.filter(|_| k) {
                 label.push_str(&format!(" k={n}"));

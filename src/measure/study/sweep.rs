@@ -1,7 +1,7 @@
 //! What is swept: values for photons, k, n, footprint scale and gather, and all their combinations.
 
 use crate::estimate::Estimator;
-use crate::estimate::registry::{estimator, with_setting};
+use crate::estimate::registry::with_setting;
 use crate::measure::study::Setting;
 use crate::render::settings::RenderSettings;
 use crate::scene::Scene;
@@ -115,14 +115,6 @@ pub fn whole_number(text: &str) -> Option<i64> {
         let x: f64 = text.parse().ok()?;
         (x.fract() == 0.0 && x.abs() < 1e15).then_some(x as i64)
     })
-}
-
-/// The estimators of a study by their names.
-///
-/// # Errors
-/// As [`estimator`].
-pub fn estimator_of(setting: &Setting) -> Result<Box<dyn Estimator>, String> {
-    estimator(&setting.estimator).map_err(|e| e.to_string())
 }
 
 #[cfg(test)]
