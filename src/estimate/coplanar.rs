@@ -10,9 +10,8 @@ use crate::estimate::clip::{self, ClippedPolygon, HalfPlane, MAX_CORNERS, MAX_VE
 use crate::estimate::kernel::silverman;
 use crate::estimate::polygon::{mean_over_parallelogram, mean_over_part};
 use crate::estimate::settings::{Spec, SpecError};
-use crate::math::rgb::Rgb;
 use crate::photons::MapPhoton;
-use glam::{DVec2, Vec3};
+use glam::{DVec2, DVec3, Vec3};
 
 /// How the photon's footprint is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -83,7 +82,7 @@ impl Coplanar {
         }
         let project = |x: Vec3| {
             let y = x - v * (photon.normal.dot(x) / across);
-            DVec2::new(f64::from(photon.rows[0].dot(y)), f64::from(photon.rows[1].dot(y)))
+            photon.to_own(DVec2::new(f64::from(photon.rows[0].dot(y)), f64::from(photon.rows[1].dot(y))))
         };
         let offset = view.query.center - photon.position;
         let [a, b] = view.query.axes;
@@ -172,7 +171,7 @@ impl Estimator for Coplanar {
         self.over_area(photon, view)
     }
 
-    fn irradiance(&self, gathered: &Gathered, view: &View) -> Rgb {
+    fn irradiance(&self, gathered: &Gathered, view: &View) -> DVec3 {
         weighted_sum(gathered, |p| self.over_area(p, view))
     }
 
