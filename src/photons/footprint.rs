@@ -153,6 +153,24 @@ mod tests {
         }
     }
 
+    /// What the thesis inverts, in f32, moves a point by its own distance where the axes are nearly parallel.
+    #[test]
+    fn an_inverse_matrix_loses_what_principal_axes_keep() {
+        let (along, across) = (DVec3::new(0.764, 0.0, 0.645).normalize(), DVec3::new(-0.645, 0.0, 0.764).normalize());
+        let axes = [along, along * 0.7 + across * 1e-6].map(|c| c.as_vec3());
+        let [a, b] = axes.map(|c| c.as_dvec3());
+        let x = (along * 0.37 + across * 4e-7).as_vec3();
+        let t = FilterTransform::new(axes, Vec3::Y, 1.0, 1e-12, 10.0);
+        let det = a.cross(b).dot(DVec3::Y);
+        let inverse = [b.cross(DVec3::Y) / det, DVec3::Y.cross(a) / det].map(|r| r.as_vec3());
+        let moved = |back: DVec3| (back - x.as_dvec3()).length();
+        let by_inverse = a * f64::from(inverse[0].dot(x)) + b * f64::from(inverse[1].dot(x));
+        let [long, short, _] = t.rows.map(|r| r.as_dvec3() / r.as_dvec3().length_squared());
+        let by_axes = long * f64::from(t.rows[0].dot(x)) + short * f64::from(t.rows[1].dot(x));
+        assert!(moved(by_axes) < 1e-7, "{}", moved(by_axes));
+        assert!(moved(by_inverse) > 1e-4, "{}", moved(by_inverse));
+    }
+
     #[test]
     fn singular_values_match_a_closed_form() {
         // [[1, 1], [0, 1]] has singular values (√5 ± 1)/2.

@@ -6,10 +6,37 @@ pub mod case;
 mod oracle;
 
 mod clipping;
+mod footprints;
 
 pub use case::{Case, Judged, Outcome, Verdict};
 
 /// All cases of this module, group by group.
 pub fn cases() -> Vec<Case> {
-    [clipping::CASES].concat()
+    [clipping::CASES, footprints::CASES].concat()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn print() {
+        let only = std::env::var("ONLY").unwrap_or_default();
+        for case in cases().into_iter().filter(|c| c.name.contains(&only) || c.group.contains(&only)) {
+            let j = case.judge();
+            println!(
+                "{:24} {:9.2e} {:9.2e} {} b {} nf {} t {} {:.1}s {:?} {}",
+                case.name,
+                j.outcome.worst,
+                case.limit,
+                j.verdict().name(),
+                j.outcome.bounded,
+                j.outcome.not_finite,
+                j.outcome.tried,
+                j.seconds,
+                j.outcome.failure,
+                j.outcome.at
+            );
+        }
+    }
 }
