@@ -138,9 +138,10 @@ impl PhotonMap {
         let (floored, capped) = (count(|t| t.floored), count(|t| t.capped));
         let longest_reach = prepared.iter().fold(0.0f32, |m, (_, t)| m.max(t.reach));
         let (overlap, photons) = if parts.overlap {
-            let (tree, order) = OverlapTree::new(prepared.iter().map(|(p, t)| (p.position, t.half_extent)));
+            let tree = OverlapTree::new(prepared.iter().map(|(p, t)| (p.position, t.half_extent)));
             // In the hierarchy's order, so that a leaf is a range of photons.
-            (Some(tree), order.iter().map(|&i| prepared[i as usize].0).collect())
+            let photons = tree.order().iter().map(|&i| prepared[i as usize].0).collect();
+            (Some(tree), photons)
         } else {
             (None, prepared.iter().map(|(p, _)| *p).collect::<Vec<_>>())
         };

@@ -7,12 +7,15 @@ mod oracle;
 
 mod clipping;
 mod footprints;
+mod passes;
+mod powers;
+mod setup;
 
 pub use case::{Case, Judged, Outcome, Verdict};
 
 /// All cases of this module, group by group.
 pub fn cases() -> Vec<Case> {
-    [clipping::CASES, footprints::CASES].concat()
+    [footprints::CASES, clipping::CASES, powers::CASES, passes::CASES].concat()
 }
 
 #[cfg(test)]
