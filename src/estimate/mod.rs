@@ -14,6 +14,8 @@ pub mod settings;
 
 #[cfg(test)]
 mod energy_tests;
+#[cfg(test)]
+mod property_tests;
 
 pub use construction::{Construction, SamplingPoint};
 

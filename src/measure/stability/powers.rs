@@ -485,7 +485,10 @@ fn white_box() -> Outcome {
 fn beyond_f32() -> Outcome {
     outcome(|out| {
         let text = BEAM
-            .replace("kind = \"spot\"\nposition = [0.0, 1e-5, 0.0]\ndirection = [0.0, -1.0, 0.0]\ncone = 1.0\nfalloff = 0.0", "kind = \"point\"\nposition = [0.0, 1e-6, 0.0]")
+            .replace(
+                "kind = \"spot\"\nposition = [0.0, 1e-5, 0.0]\ndirection = [0.0, -1.0, 0.0]\ncone = 1.0\nfalloff = 0.0",
+                "kind = \"point\"\nposition = [0.0, 1e-6, 0.0]",
+            )
             .replace("power = [7.0, 7.0, 7.0]", "power = [1e30, 1e30, 1e30]");
         // In micrometres, so that all of the floor is that near.
         let small = text
