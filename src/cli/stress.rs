@@ -109,6 +109,11 @@ pub fn run(args: &StressArgs) -> Result<(), Failure> {
     } else if !args.quiet {
         print(&text(&judged))?;
     }
+    ending(&judged)
+}
+
+/// Success, or the cases that do not hold.
+fn ending(judged: &[Judged]) -> Result<(), Failure> {
     let failed: Vec<&str> = judged.iter().filter(|j| j.verdict() != Verdict::Holds).map(|j| j.case.name).collect();
     match failed.is_empty() {
         true => Ok(()),
@@ -245,6 +250,23 @@ mod tests {
             assert!(all[first..=i].iter().all(|d| d.group == c.group), "{} is apart from its group", c.name);
             assert!(!c.name.contains([' ', '|']) && !c.what.contains('|') && !c.range.contains('|'));
         }
+    }
+
+    #[test]
+    fn a_case_that_fails_is_told_and_ends_with_1() {
+        let case =
+            Case { group: "g", name: "far-off", what: "w", range: "r", oracle: "o", limit: 0.1, run: Default::default };
+        let seen = |worst| Judged {
+            case,
+            outcome: stability::Outcome { tried: 1, worst, at: "there".into(), ..Default::default() },
+            seconds: 0.0,
+        };
+        assert!(ending(&[seen(0.1)]).is_ok());
+        let failure = ending(&[seen(0.1), seen(0.2)]).expect_err("0.2 is above the limit");
+        assert_eq!(failure.code(), 1);
+        assert!(failure.to_string().starts_with("1 of 2 cases fail: far-off"), "{failure}");
+        let text = text(&[seen(0.2)]);
+        assert!(text.contains("exceeds") && text.contains("at there") && text.contains("0 of 1 cases hold"), "{text}");
     }
 
     #[test]
