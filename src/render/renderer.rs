@@ -354,6 +354,7 @@ impl Renderer {
     fn record(&mut self, pass: &Pass, now: &[usize], result: &ViewResult, photon_seconds: f64) {
         self.bounded.views += result.counts.bounded;
         self.inside_glass += result.counts.camera_inside_glass;
+        self.bounded.overflow += result.counts.overflow;
         self.seconds.view_trace += result.view_trace;
         for (slot, &i) in now.iter().enumerate() {
             let s = &result.seconds[slot];
@@ -486,6 +487,12 @@ impl Renderer {
         let mut all = self.scene.warnings.clone();
         if self.counted > 0 && self.plan.needs_photons() && self.stored == StoredCounts::default() {
             all.push(format!("none of {} photons was stored", self.emitted));
+        }
+        if self.bounded.overflow > 0 {
+            all.push(format!(
+                "{} pixel values of all passes are beyond 32 bits and were lowered to 3.4e38; lower the power of lights",
+                self.bounded.overflow
+            ));
         }
         if self.inside_glass > 0 {
             all.push(format!("the camera stands inside glass: {} view rays start there", self.inside_glass));

@@ -68,6 +68,8 @@ pub struct Bounded {
     pub footprint_floor: u64,
     /// Photon footprints lowered to the scene's radius.
     pub footprint_ceiling: u64,
+    /// Pixels of passes whose radiance is beyond 32 bits, lowered to the largest number; one for each estimator.
+    pub overflow: u64,
 }
 
 /// Largest resident memory of this process so far, bytes; None where the system does not say.

@@ -52,6 +52,8 @@ pub struct ViewCounts {
     pub bounded: PathCounts,
     /// Camera rays that met the inside of a dielectric first.
     pub camera_inside_glass: u64,
+    /// Pixels whose radiance is beyond 32 bits, one for each estimator.
+    pub overflow: u64,
 }
 
 /// What view paths need.
@@ -156,7 +158,7 @@ impl ViewTracer<'_> {
             match material {
                 Material::Emitter { radiance: emitted } => {
                     if surface.front && self.plan.emission {
-                        light = branch.throughput * *emitted;
+                        light = times(branch.throughput, *emitted);
                         radiance += light;
                     }
                 }
@@ -164,15 +166,15 @@ impl ViewTracer<'_> {
                     let weight = branch.throughput * material.diffuse_reflectance(surface.uv) * FRAC_1_PI;
                     if self.plan.shadow_rays {
                         let receiver = Receiver { position: surface.position, normal: surface.normal };
-                        light = weight
-                            * direct::irradiance(
-                                self.scene,
-                                self.intersector,
-                                &receiver,
-                                self.settings.shadow_rays,
-                                sequence,
-                                index,
-                            );
+                        let irradiance = direct::irradiance(
+                            self.scene,
+                            self.intersector,
+                            &receiver,
+                            self.settings.shadow_rays,
+                            sequence,
+                            index,
+                        );
+                        light = times(weight, irradiance);
                         radiance += light;
                     }
                     if self.plan.needs_photons() && weight != Rgb::ZERO {
@@ -269,6 +271,11 @@ impl ViewTracer<'_> {
             follow(reflect(d), weights.reflected, branch.medium);
         }
     }
+}
+
+/// Light times a weight; a weight of 0 takes all of it, even if it is beyond 32 bits.
+fn times(weight: Rgb, light: Rgb) -> Rgb {
+    Rgb::select(weight.cmpeq(Rgb::ZERO), Rgb::ZERO, weight * light)
 }
 
 /// Position of a view ray in its pixel: the centre of cell `(i, j)` of `n`×`n`, or a random point of the cell.

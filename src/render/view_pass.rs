@@ -52,6 +52,8 @@ pub struct TileImage {
     pub seconds: PartSeconds,
     /// Photons looked at, for all hits.
     pub gathered: u64,
+    /// Pixels whose radiance is beyond 32 bits.
+    pub overflow: u64,
 }
 
 /// A finished tile.
@@ -191,6 +193,7 @@ impl ViewPass<'_> {
         for tile in &tiles {
             counts.bounded += tile.counts.bounded;
             counts.camera_inside_glass += tile.counts.camera_inside_glass;
+            counts.overflow += tile.counts.overflow;
             for (i, image) in tile.images.iter().enumerate() {
                 seconds[i].add(&image.seconds, scale);
                 gathered[i] += image.gathered;
@@ -227,6 +230,7 @@ impl ViewPass<'_> {
                     }
                     let mut image = self.estimate(&base, n, &slots[i], scratch);
                     image.seconds.view_trace = view_trace;
+                    counts.overflow += image.overflow;
                     images[i] = Some(image);
                 }
             }
@@ -304,6 +308,7 @@ impl ViewPass<'_> {
     /// batch unless photons overlap by the thousand, so that memory stays bounded.
     pub(super) fn estimate(&self, base: &[Rgb], n: u32, slot: &Slot, scratch: &mut Scratch) -> TileImage {
         let mut sums: Vec<DVec3> = base.iter().map(|b| b.as_dvec3()).collect();
+        let mut overflow = vec![false; sums.len()];
         let mut seconds = PartSeconds::default();
         let mut gathered = 0;
         let mut next = 0;
@@ -331,13 +336,19 @@ impl ViewPass<'_> {
                     let found = Gathered { photons: map.photons(), indices: &scratch.indices[from..to], radius };
                     irradiance += slot.estimator.irradiance(&found, &hit.seen_by(slot.estimator));
                 }
+                // The sum over maps may be infinite although each is finite, and infinity times 0 is no number.
+                overflow[hit.pixel as usize] |= irradiance.max_element() >= f32::MAX;
+                let irradiance = irradiance.min(Rgb::splat(f32::MAX));
                 sums[hit.pixel as usize] += irradiance.as_dvec3() * hit.weight.as_dvec3();
             }
             seconds.estimate += start.elapsed().as_secs_f64();
         }
         let scale = 1.0 / f64::from(n * n);
+        let largest = f64::from(f32::MAX);
+        let too_bright = |(s, o): (&DVec3, &bool)| *o || !(s.max_element() * scale <= largest);
+        let overflow = sums.iter().zip(&overflow).filter(|p| too_bright(*p)).count() as u64;
         let pixels = sums.into_iter().map(|s| finite(s * scale)).collect();
-        TileImage { pixels, seconds, gathered }
+        TileImage { pixels, seconds, gathered, overflow }
     }
 
     /// Traces and gathers for a tile as [`ViewPass::run`] does, and keeps what was found: four bytes for each photon of

@@ -40,6 +40,9 @@ impl Loader<'_> {
             ],
         )?;
         self.animation(key, l.animate.as_ref())?;
+        if l.kind == "quad" {
+            self.reserve(key, 2, 4, "leave lights out")?;
+        }
         let place = |name: &str, value: Option<[f64; 3]>| -> Checked<DVec3> {
             self.vector(&at(name), self.required(key, name, value)?)
         };
@@ -87,12 +90,12 @@ impl Loader<'_> {
             }
         };
         if let LightSource::Quad { u, v, .. } = &light
-            && u.cross(*v).length_squared() == 0.0
+            && u.cross(*v) == DVec3::ZERO
         {
             return self.wrong(at("v"), "the quad has no area; u and v must not be parallel");
         }
         self.light_surface(&light);
-        self.assembly.lights.push(light);
+        self.assembly.lights.push((key.to_owned(), light));
         Ok(())
     }
 

@@ -1,0 +1,37 @@
+//! Replays what the fuzz targets have found, file by file.
+
+#![allow(clippy::expect_used, clippy::panic, missing_docs, reason = "a failed expectation is how this program reports")]
+
+#[path = "corpus/targets.rs"]
+mod targets;
+
+use std::path::Path;
+
+fn replay(folder: &str, target: fn(&[u8]) -> Result<(), String>) {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/corpus").join(folder);
+    for entry in std::fs::read_dir(&folder).expect("a folder of inputs") {
+        let path = entry.expect("an entry").path();
+        let input = std::fs::read(&path).expect("reads");
+        if std::panic::catch_unwind(|| target(&input)).is_err() {
+            panic!("{} breaks what must hold; the reason is above", path.display());
+        }
+    }
+}
+
+#[test]
+fn scenes() {
+    replay("scene", targets::scene);
+}
+
+#[test]
+fn meshes() {
+    replay("obj", targets::obj);
+}
+
+#[test]
+fn sessions() {
+    replay("session", targets::session);
+}
+
+#[test]
+fn seeds() { for e in std::fs::read_dir("fuzz/corpus/scene").unwrap() { let p=e.unwrap().path(); let n=p.file_name().unwrap().to_string_lossy().into_owned(); if n.len()<30 { println!("{n}: {:?}", targets::scene(&std::fs::read(&p).unwrap())); } } }
