@@ -32,6 +32,3 @@ fn meshes() {
 fn sessions() {
     replay("session", targets::session);
 }
-
-#[test]
-fn seeds() { for e in std::fs::read_dir("fuzz/corpus/scene").unwrap() { let p=e.unwrap().path(); let n=p.file_name().unwrap().to_string_lossy().into_owned(); if n.len()<30 { println!("{n}: {:?}", targets::scene(&std::fs::read(&p).unwrap())); } } }

@@ -21,6 +21,7 @@ use crate::measure::truth::{TRUTH_RAYS, truth};
 use crate::measure::window::{busiest_window, contours, disagreement};
 use crate::render::Step;
 use crate::render::film::{Image, Rect};
+use crate::render::memory::check_images;
 use crate::render::photon_pass::PhotonMaps;
 use crate::render::plan::Slot;
 use crate::render::settings::{Gather, LightPart, PlanMode, RenderSettings};
@@ -175,7 +176,9 @@ impl<'a> Comparison<'a> {
         let regular = Regular::with_rays(TRUTH_RAYS);
         let truth = [Slot { estimator: &regular, gather: settings.gather }];
         let also: &[Slot] = if args.truth == Truth::None { &[] } else { &truth };
-        let renderer = Renderer::planned_for(Arc::new(scene), settings, estimators, also);
+        check_images(&settings, estimators.len())?;
+        let mut renderer = Renderer::planned_for(Arc::new(scene), settings, estimators, also);
+        renderer.check_memory()?;
         Ok(Self {
             args,
             crop,

@@ -267,9 +267,14 @@ impl Pilot {
         };
         let (sampling, seed) = (settings.sampling, settings.seed);
         let emitter = Emitter { scene, intersector, path, sampling, photons: PILOT_PHOTONS, seed };
-        let pass = emitter.run(photon_pass::PILOT_PASS, &|| false);
-        let (caustic, global) = (pass.stored.caustic.len() as u64, pass.stored.global.len() as u64);
-        Self { emitted: pass.emitted, caustic, global }
+        let (emitted, [_, caustic, global]) = emitter.count(photon_pass::PILOT_PASS);
+        Self { emitted, caustic, global }
+    }
+
+    /// Caustic and global photons that were stored for each that was emitted. Where none was, as many as the rule of
+    /// three allows.
+    pub fn stored_per_photon(&self) -> [f64; 2] {
+        [self.caustic, self.global].map(|stored| stored.max(3) as f64 / self.emitted.max(1) as f64)
     }
 
     fn verdict(&self, count: u64, what: &str) -> (bool, String) {

@@ -5,6 +5,7 @@ use crate::render::change::{PhotonStore, World, film_is_kept, photons_are_kept};
 use crate::render::error_estimate::ErrorEstimate;
 use crate::render::film::{Film, Rect};
 use crate::render::flat_pixels::FlatPixels;
+use crate::render::memory::{MemoryNeed, foreseen};
 use crate::render::pass::{Pass, needs_flat_pixels, scale_of};
 use crate::render::photon_pass::{Emitter, PhotonMaps, PhotonPass};
 use crate::render::plan::{Pilot, Plan, Slot};
@@ -14,6 +15,7 @@ use crate::render::tiles::TILE;
 use crate::render::view_pass::{PartSeconds, ViewPass, ViewResult};
 use crate::render::watch::{FilmWatch, Watch};
 use crate::scene::Scene;
+use crate::scene::memory::Shortage;
 use crate::trace::Intersector;
 use std::sync::Arc;
 use std::time::Instant;
@@ -222,6 +224,24 @@ impl Renderer {
         self.plan = Plan::new(&self.scene, &self.settings, &served, self.pilot.as_ref());
         self.plan_is_stale = false;
         self.seconds.plan = start.elapsed().as_secs_f64();
+    }
+
+    /// What the next pass is expected to need. It makes the plan if there is none yet, and sends the pilot's photons
+    /// where the plan did not ask for them but the most that a pass can store would not fit.
+    pub fn memory(&mut self) -> MemoryNeed {
+        if self.plan_is_stale {
+            self.make_plan(&[]);
+        }
+        let (scene, settings, pilot) = (&self.scene, &self.settings, self.pilot.as_ref());
+        foreseen(scene, &self.intersector, settings, &self.plan, pilot, self.estimators.len())
+    }
+
+    /// Makes sure that the next pass can be had; see [`Renderer::memory`].
+    ///
+    /// # Errors
+    /// If it cannot; one line.
+    pub fn check_memory(&mut self) -> Result<(), Shortage> {
+        self.memory().check(&self.settings)
     }
 
     /// Makes the next pass of the estimators that have the fewest: photons, maps, and one image for each of them.

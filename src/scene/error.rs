@@ -47,7 +47,11 @@ pub enum SceneError {
 pub fn one_line(text: &str) -> String {
     let mut line = String::with_capacity(text.len());
     for c in text.chars() {
-        if c.is_control() || matches!(c, '\u{2028}' | '\u{2029}') { line.extend(c.escape_default()) } else { line.push(c) }
+        if c.is_control() || matches!(c, '\u{2028}' | '\u{2029}') {
+            line.extend(c.escape_default())
+        } else {
+            line.push(c)
+        }
     }
     line
 }
@@ -58,7 +62,8 @@ mod tests {
 
     #[test]
     fn an_error_is_one_line_whatever_it_quotes() {
-        let error = SceneError::At { file: "a\nb.toml".into(), line: 3, key: "k".into(), what: "got `x\r\u{1b}é`".into() };
+        let error =
+            SceneError::At { file: "a\nb.toml".into(), line: 3, key: "k".into(), what: "got `x\r\u{1b}é`".into() };
         assert_eq!(error.to_string(), "a\\nb.toml:3: k: got `x\\r\\u{1b}é`");
     }
 }

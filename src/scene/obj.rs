@@ -138,18 +138,29 @@ fn check_lines(text: &str) -> Result<(), ObjError> {
         let mut words = line.split_whitespace();
         match words.next() {
             Some(kind @ ("v" | "vn" | "vt")) => {
-                let mut numbers = 0;
+                let mut numbers = Vec::new();
                 for word in words {
                     match word.parse::<f64>() {
-                        Ok(x) if x.abs() <= MAX_LENGTH => numbers += 1,
+                        Ok(x) if x.abs() <= MAX_LENGTH => numbers.push(x),
                         _ => {
                             let most = format!("finite numbers, {MAX_LENGTH:e} at most");
                             return wrong(format!("`{kind}` wants {most}, got `{word}`"));
                         }
                     }
                 }
-                if numbers < if kind == "vt" { 1 } else { 3 } {
-                    return wrong(format!("`{kind}` has {numbers} numbers, too few; is the file cut off?"));
+                let count = numbers.len();
+                if count < if kind == "vt" { 1 } else { 3 } {
+                    return wrong(format!("`{kind}` has {count} numbers, too few; is the file cut off?"));
+                }
+                if kind == "v" {
+                    if !matches!(count, 3 | 4 | 6) {
+                        return wrong(format!("`v` has {count} numbers; give 3, or 4 with w, or 6 with a colour"));
+                    }
+                    // The fourth number divides the others.
+                    let w = if count == 4 { numbers[3] } else { 1.0 };
+                    if !numbers[..3].iter().all(|x| (x / w).abs() <= MAX_LENGTH) {
+                        return wrong(format!("divided by w = {w:e}, `v` must be {MAX_LENGTH:e} at most; leave w out"));
+                    }
                 }
                 *counts.entry(kind).or_default() += 1;
             }
@@ -319,6 +330,10 @@ mod tests {
             ("v 0 0 0\nv 1 nan 0\n", 2),
             ("v 0 0 0\nv 1 0 0\nv 0 1 0\n\nf 1 2 4\n", 5),
             ("v 0 0\n", 1),
+            ("v 1 1 1 0\n", 1),
+            ("v 0 0 0 1\nv 1 1 1 5e-324\n", 2),
+            ("v 0 0 0 1 1\n", 1),
+            ("v 0 0 1e16\n", 1),
             ("v 0 0 0\nf 1 1\n", 2),
             ("v 0 0 0\nf a b c\n", 2),
         ] {

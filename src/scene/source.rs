@@ -49,10 +49,9 @@ impl Files {
                 .find(|(n, _)| *n == name)
                 .map(|(n, text)| (PathBuf::from(n), text.as_bytes().to_vec()))
                 .ok_or_else(|| missing("not among the built-in files")),
-            Self::Memory(files) => files
-                .get(name)
-                .map(|bytes| (PathBuf::from(name), bytes.clone()))
-                .ok_or_else(|| missing("no such file")),
+            Self::Memory(files) => {
+                files.get(name).map(|bytes| (PathBuf::from(name), bytes.clone())).ok_or_else(|| missing("no such file"))
+            }
         }
     }
 }
