@@ -268,20 +268,24 @@ fn mean_seen_edge_on(c: DVec3, a: DVec3, b: DVec3) -> f64 {
         return (1.0 - c.length_squared()).max(0.0).powi(2);
     }
     let e1 = a / length;
-    let x = c.dot(e1);
-    mean_over_segment(x, (c - e1 * x).length_squared(), length, b.dot(e1).abs())
+    let (x, along) = (c.dot(e1), b.dot(e1));
+    let across = c - e1 * x;
+    let slope = 2.0 * across.dot(b - e1 * along) * 1f64.copysign(along);
+    mean_over_segment(x, across.length_squared(), slope, length, along.abs())
 }
 
-/// Mean over points `x + s l + t w` of a line at squared distance `off` from the origin, `|s|, |t| ≤ 1`: the
-/// parallelogram seen edge-on, whose points lie on the line with a trapezoid density.
-fn mean_over_segment(x: f64, off: f64, l: f64, w: f64) -> f64 {
-    let rho2 = 1.0 - off;
-    if rho2 <= 0.0 {
+/// Mean over points `x + s l + t w` of a line, `|s|, |t| ≤ 1`, whose squared distance from the origin is `off + t slope`:
+/// the parallelogram seen edge-on, whose points lie on the line with a trapezoid density.
+///
+/// * `l`: positive, at least `w`.
+fn mean_over_segment(x: f64, off: f64, slope: f64, l: f64, w: f64) -> f64 {
+    let widest = 1.0 - off + slope.abs();
+    if widest <= 0.0 {
         return 0.0;
     }
-    let (flat, end) = ((l - w).abs(), l + w);
-    let top = 1.0 / (2.0 * l.max(w));
-    let rho = rho2.sqrt();
+    let (flat, end) = (l - w, l + w);
+    let top = 0.5 / l;
+    let rho = widest.sqrt();
     let mut sum = 0.0;
     for (from, to) in [(-end, -flat), (-flat, flat), (flat, end)] {
         let (low, high) = (from.max(-rho - x), to.min(rho - x));
@@ -291,8 +295,11 @@ fn mean_over_segment(x: f64, off: f64, l: f64, w: f64) -> f64 {
         let (middle, radius) = ((low + high) / 2.0, (high - low) / 2.0);
         for (node, weight) in GAUSS {
             let at = middle + radius * node;
-            let density = if at.abs() <= flat { top } else { top * (end - at.abs()) / (end - flat) };
-            let k = (rho2 - (x + at) * (x + at)).max(0.0);
+            // Where s has reached its end, t is no longer as often negative as positive: to first order in the width
+            // its mean decides how far off the points lie.
+            let past = ((at.abs() - flat) / (end - flat)).clamp(0.0, 1.0);
+            let (density, t) = if at.abs() <= flat { (top, 0.0) } else { (top * (1.0 - past), past.copysign(at)) };
+            let k = (1.0 - off - slope * t - (x + at) * (x + at)).max(0.0);
             sum += weight * radius * density * k * k;
         }
     }

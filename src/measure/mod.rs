@@ -6,6 +6,7 @@ pub mod flip;
 pub mod image_file;
 pub mod metrics;
 pub mod reference;
+pub mod stability;
 pub mod study;
 pub mod tracer;
 pub mod trimmed;

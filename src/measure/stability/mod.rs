@@ -1,0 +1,15 @@
+//! Stability cases: kernels and renders driven to where numbers break, each against an oracle of its own.
+//!
+//! One file for each group. An oracle is a closed form, f64, or brute force; it shares nothing with what it judges.
+
+pub mod case;
+mod oracle;
+
+mod clipping;
+
+pub use case::{Case, Judged, Outcome, Verdict};
+
+/// All cases of this module, group by group.
+pub fn cases() -> Vec<Case> {
+    [clipping::CASES].concat()
+}
