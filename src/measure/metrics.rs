@@ -16,6 +16,11 @@ pub struct Mask {
 }
 
 impl Mask {
+    /// Lets those pixels count no more that are marked, row by row.
+    pub fn leave_out(&mut self, pixels: &[bool]) {
+        self.counts.iter_mut().zip(pixels).for_each(|(counts, out)| *counts &= !out);
+    }
+
     /// All pixels.
     pub fn all(size: [u32; 2]) -> Self {
         Self { size, counts: vec![true; size[0] as usize * size[1] as usize] }
