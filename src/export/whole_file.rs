@@ -37,7 +37,11 @@ fn replace(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
         Some(p) if !p.as_os_str().is_empty() => p,
         _ => Path::new("."),
     };
-    std::fs::create_dir_all(folder)?;
+    std::fs::create_dir_all(folder).map_err(|e| match e.kind() {
+        // A file is where a folder should be.
+        std::io::ErrorKind::AlreadyExists => std::io::ErrorKind::NotADirectory.into(),
+        _ => e,
+    })?;
     let mut file = tempfile::Builder::new().prefix(".cusp-").permissions_like_any_file().tempfile_in(folder)?;
     file.write_all(bytes)?;
     // A system may find out only now that there is no room.

@@ -73,7 +73,7 @@ fn image_bytes(size: [u32; 2], estimators: usize) -> u64 {
     let film = size_of::<DVec3>() + error_estimate::BYTES_PER_PIXEL;
     // A tile's pixels and the finished image.
     let image = 2 * size_of::<Vec3>();
-    bytes(pixels, (film + image) * estimators.max(1))
+    bytes(pixels.saturating_mul(estimators.max(1) as u64), film + image)
 }
 
 /// Makes sure that the images of so many estimators can be had, before any film is.

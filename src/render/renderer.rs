@@ -75,6 +75,8 @@ pub struct Renderer {
     inside_glass: u64,
     /// Area of footprints for each pass so far.
     areas: Vec<f64>,
+    /// What a pass was expected to need, when it was asked last.
+    need: Option<MemoryNeed>,
 }
 
 impl Renderer {
@@ -127,6 +129,7 @@ impl Renderer {
             bounded: Bounded::default(),
             inside_glass: 0,
             areas: vec![1.0],
+            need: None,
         }
     }
 
@@ -236,12 +239,19 @@ impl Renderer {
         foreseen(scene, &self.intersector, settings, &self.plan, pilot, self.estimators.len())
     }
 
+    /// What [`Renderer::check_memory`] found; None if it was not asked.
+    pub fn memory_need(&self) -> Option<&MemoryNeed> {
+        self.need.as_ref()
+    }
+
     /// Makes sure that the next pass can be had; see [`Renderer::memory`].
     ///
     /// # Errors
     /// If it cannot; one line.
     pub fn check_memory(&mut self) -> Result<(), Shortage> {
-        self.memory().check(&self.settings)
+        let need = self.memory();
+        self.need = Some(need);
+        need.check(&self.settings)
     }
 
     /// Makes the next pass of the estimators that have the fewest: photons, maps, and one image for each of them.

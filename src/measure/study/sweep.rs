@@ -113,7 +113,7 @@ fn fill<T>(into: &mut Vec<T>, text: &str, values: &[&str], parse: impl Fn(&str) 
 pub fn whole_number(text: &str) -> Option<i64> {
     text.parse().ok().or_else(|| {
         let x: f64 = text.parse().ok()?;
-        (x.fract() == 0.0 && x.abs() < 1e15).then_some(x as i64)
+        (x.fract() == 0.0 && x.abs() < i64::MAX as f64).then_some(x as i64)
     })
 }
 
