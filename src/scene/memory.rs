@@ -8,6 +8,9 @@ use std::path::Path;
 /// What is assumed where the system does not say, bytes.
 pub const ASSUMED: u64 = 8 << 30;
 
+/// Bytes that are taken without asking.
+pub const ALWAYS: u64 = 64 << 20;
+
 /// More memory than can be had; one line without a place.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{asked} would need {} of memory, of which {} can be had; {advice}", text(*needed), text(*available))]
@@ -27,6 +30,10 @@ pub struct Shortage {
 /// # Errors
 /// If it is more.
 pub fn check(asked: impl Into<String>, needed: u64, advice: impl Into<String>) -> Result<(), Shortage> {
+    // To ask the system takes longer than to take a little.
+    if needed <= ALWAYS {
+        return Ok(());
+    }
     check_against(available(), asked, needed, advice)
 }
 

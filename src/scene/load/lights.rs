@@ -40,9 +40,6 @@ impl Loader<'_> {
             ],
         )?;
         self.animation(key, l.animate.as_ref())?;
-        if l.kind == "quad" {
-            self.reserve(key, 2, 4, "leave lights out")?;
-        }
         let place = |name: &str, value: Option<[f64; 3]>| -> Checked<DVec3> {
             self.vector(&at(name), self.required(key, name, value)?)
         };

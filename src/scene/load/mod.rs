@@ -63,6 +63,7 @@ pub fn parse(file: &Path, text: &str) -> Checked<SceneFile> {
 pub fn scene_from_file(file: &Path, text: &str, parsed: &SceneFile, files: &Files) -> Checked<Scene> {
     let mut loader = Loader::new(Locator::new(file, text), files);
     loader.texts.push(text.to_owned());
+    loader.foresee(&parsed.shapes, &parsed.lights)?;
     loader.materials(&parsed.materials)?;
     for (i, shape) in parsed.shapes.iter().enumerate() {
         loader.shape(&format!("shapes[{i}]"), shape)?;
@@ -139,8 +140,8 @@ struct Loader<'a> {
     assembly: Assembly,
     material_index: BTreeMap<String, u32>,
     warnings: Vec<String>,
-    /// Memory that could be had before the first shape, bytes.
-    memory: u64,
+    /// Memory that could be had before the first large shape, bytes.
+    memory: Option<u64>,
     /// Triangles of all shapes so far, those of the next one included.
     triangles: u64,
     /// Their vertices and normals, the more numerous of the two.
@@ -156,13 +157,13 @@ impl<'a> Loader<'a> {
             assembly: Assembly::default(),
             material_index: BTreeMap::new(),
             warnings: Vec::new(),
-            memory: memory::available(),
+            memory: None,
             triangles: 0,
             vertices: 0,
         }
     }
 
-    /// Makes sure that a shape's triangles can be had beside all those before it, before any is made.
+    /// Counts a shape's triangles among all and makes sure that these can be had.
     fn reserve(&mut self, key: &str, triangles: u64, vertices: u64, advice: &str) -> Checked<()> {
         self.triangles = self.triangles.saturating_add(triangles);
         self.vertices = self.vertices.saturating_add(vertices);
@@ -174,7 +175,11 @@ impl<'a> Loader<'a> {
             return self.wrong(key, what);
         }
         let needed = memory::bytes(self.triangles, TRIANGLE_BYTES) + memory::bytes(self.vertices, VERTEX_BYTES);
-        memory::check_against(self.memory, format!("{} triangles in all", self.triangles), needed, advice)
+        if needed <= memory::ALWAYS {
+            return Ok(());
+        }
+        let available = *self.memory.get_or_insert_with(memory::available);
+        memory::check_against(available, format!("{} triangles in all", self.triangles), needed, advice)
             .or_else(|short| self.wrong(key, short.to_string()))
     }
 

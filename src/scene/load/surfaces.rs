@@ -5,12 +5,39 @@ use super::{Checked, Loader, MAX_LENGTH};
 use crate::math::rgb::Rgb;
 use crate::scene::geometry::NONE;
 use crate::scene::obj::{self, CREASE_ANGLE};
-use crate::scene::scene_file::{RotateFile, ShapeFile};
+use crate::scene::scene_file::{LightFile, RotateFile, ShapeFile};
 use crate::scene::shapes::{self, Placement};
 use crate::scene::{Material, SceneError};
 use glam::{DMat3, DVec3};
 
+/// Facets around a ring, if none are given.
+const SEGMENTS: i64 = 256;
+/// Most of them.
+const MAX_SEGMENTS: i64 = 1_000_000;
+
 impl Loader<'_> {
+    /// Makes sure that the triangles of all shapes whose number the file tells can be had, before any is made. Meshes
+    /// are counted when they are read.
+    pub(super) fn foresee(&mut self, shapes: &[ShapeFile], lights: &[LightFile]) -> Checked<()> {
+        for (i, s) in shapes.iter().enumerate() {
+            let key = format!("shapes[{i}]");
+            match s.kind.as_str() {
+                "quad" => self.reserve(&key, 2, 4, "leave shapes out")?,
+                "box" => self.reserve(&key, 12, 24, "leave shapes out")?,
+                "ring" => {
+                    // Numbers out of range are refused in their turn.
+                    let n = s.segments.unwrap_or(SEGMENTS).clamp(0, MAX_SEGMENTS) as u64;
+                    self.reserve(&format!("{key}.segments"), 6 * n, 4 * n, "lower segments, or leave shapes out")?;
+                }
+                _ => {}
+            }
+        }
+        for (i, _) in lights.iter().enumerate().filter(|(_, l)| l.kind == "quad") {
+            self.reserve(&format!("lights[{i}]"), 2, 4, "leave lights out")?;
+        }
+        Ok(())
+    }
+
     pub(super) fn placement(&self, key: &str, shape: &ShapeFile) -> Checked<Placement> {
         let scale = match shape.scale {
             Some(s) => self.positive(&format!("{key}.scale"), s, "a factor")?,
@@ -119,7 +146,6 @@ impl Loader<'_> {
                         power: (radiance.as_dvec3() * (std::f64::consts::PI * area)).as_vec3(),
                     });
                 }
-                self.reserve(key, 2, 4, "leave shapes out")?;
                 shapes::quad(center, u, v)
             }
             "box" => {
@@ -127,7 +153,6 @@ impl Loader<'_> {
                 for h in half {
                     self.positive(&at("half_size"), h, "metres")?;
                 }
-                self.reserve(key, 12, 24, "leave shapes out")?;
                 shapes::cuboid(DVec3::from_array(half))
             }
             "ring" => {
@@ -139,14 +164,11 @@ impl Loader<'_> {
                 if !(outer > inner && outer <= MAX_LENGTH) {
                     return self.wrong(at("outer"), format!("must exceed `inner` ({inner}), got {outer}"));
                 }
-                let segments = s.segments.unwrap_or(256);
-                if !(3..=1_000_000).contains(&segments) {
-                    return self.wrong(at("segments"), format!("must lie in 3 to 1000000, got {segments}"));
+                let segments = s.segments.unwrap_or(SEGMENTS);
+                if !(3..=MAX_SEGMENTS).contains(&segments) {
+                    return self.wrong(at("segments"), format!("must lie in 3 to {MAX_SEGMENTS}, got {segments}"));
                 }
-                let segments = segments as u32;
-                let (triangles, vertices) = (6 * u64::from(segments), 4 * u64::from(segments));
-                self.reserve(&at("segments"), triangles, vertices, "lower segments, or leave shapes out")?;
-                shapes::ring(inner, outer, height, segments)
+                shapes::ring(inner, outer, height, segments as u32)
             }
             _ => return self.mesh(key, s, &place, material),
         };
