@@ -32,3 +32,27 @@ fn meshes() {
 fn sessions() {
     replay("session", targets::session);
 }
+
+/// Inputs that once broke what must hold, with what they are refused for now.
+#[test]
+fn findings_are_refused() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/corpus");
+    type Target = fn(&[u8]) -> Result<(), String>;
+    let cases: [(&str, Target, &str); 2] = [
+        (
+            "obj/crash-vertex-divided-by-a-tiny-w.obj",
+            targets::obj,
+            "mesh.obj:7: OBJ: divided by w = 5e-324, `v` must be",
+        ),
+        (
+            "session/crash-light-that-is-no-number.toml",
+            targets::session,
+            "lights[0].radius: must be positive and finite",
+        ),
+    ];
+    for (file, target, why) in cases {
+        let input = std::fs::read(folder.join(file)).expect("reads");
+        let error = target(&input).expect_err(file);
+        assert!(error.contains(why), "{file}: {error}");
+    }
+}

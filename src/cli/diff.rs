@@ -190,7 +190,9 @@ struct Pair {
 impl Pair {
     fn read(args: &DiffArgs) -> Result<Self, Failure> {
         let read = |path| image_file::read_reference(path).map_err(|e| Failure::Call(e.to_string()));
-        let ((mut image, _, odd), (mut reference, _, odd_reference)) = (read(&args.image)?, read(&args.reference)?);
+        let (read_image, read_reference) = (read(&args.image)?, read(&args.reference)?);
+        let (odd, odd_reference) = (read_image.not_finite, read_reference.not_finite);
+        let (mut image, mut reference) = (read_image.image, read_reference.image);
         same_size(&args.image, image.size, &args.reference, reference.size)?;
         let mut mask = match &args.mask {
             Some(path) => image_file::read_mask(path).map_err(|e| Failure::Call(e.to_string()))?,

@@ -63,19 +63,30 @@ impl std::fmt::Display for NotFinite {
     }
 }
 
-/// As [`read`] for an image that others are compared with, with the facts of its header: pixels that are not finite are
+/// An image that others are compared with, as [`read_reference`] reads it.
+#[derive(Clone, Debug)]
+pub struct Marked {
+    /// The image; black where a pixel is not finite.
+    pub image: Image,
+    /// Facts that Cusp wrote into the header of an EXR file; a PNG has none.
+    pub facts: Vec<(String, String)>,
+    /// Pixels that are not finite in the file.
+    pub not_finite: Option<NotFinite>,
+}
+
+/// As [`read`] for an image that others are compared with: pixels that are not finite are
 /// made black and told of instead, so that they can be left out of all counts.
 ///
 /// # Errors
 /// As for [`read`], but for these pixels.
-pub fn read_reference(path: &Path) -> Result<(Image, Vec<(String, String)>, Option<NotFinite>), ReadError> {
+pub fn read_reference(path: &Path) -> Result<Marked, ReadError> {
     let both = bytes_of(path).and_then(|bytes| Ok((decode_any(&bytes)?, exr_header::facts(&bytes))));
     let (mut image, facts) = both.map_err(|why| ReadError { path: path.to_owned(), why })?;
     let odd = NotFinite::of(&image);
     if let Some(odd) = &odd {
         image.pixels.iter_mut().zip(&odd.pixels).filter(|(_, o)| **o).for_each(|(p, _)| *p = Rgb::ZERO);
     }
-    Ok((image, facts, odd))
+    Ok(Marked { image, facts, not_finite: odd })
 }
 
 /// Reads a mask: pixels of 50 % grey and brighter count.

@@ -345,7 +345,7 @@ impl ViewPass<'_> {
         }
         let scale = 1.0 / f64::from(n * n);
         let largest = f64::from(f32::MAX);
-        let too_bright = |(s, o): (&DVec3, &bool)| *o || !(s.max_element() * scale <= largest);
+        let too_bright = |(s, o): (&DVec3, &bool)| *o || !s.is_finite() || s.max_element() * scale > largest;
         let overflow = sums.iter().zip(&overflow).filter(|p| too_bright(*p)).count() as u64;
         let pixels = sums.into_iter().map(|s| finite(s * scale)).collect();
         TileImage { pixels, seconds, gathered, overflow }

@@ -47,7 +47,8 @@ pub const BYTES_PER_TRIANGLE: usize = 3 * INDICES + HIERARCHY;
 /// Three lists of three indices and one of materials.
 const INDICES: usize = size_of::<[[u32; 3]; 3]>() + size_of::<u32>();
 
-/// As measured with a million triangles: 240 bytes at the highest.
+/// Boxes, leaves and nodes while they are built. With all lists and vertices a ring of 1.2 million triangles took 349
+/// bytes for each at the highest.
 const HIERARCHY: usize = 240;
 
 /// Memory that a vertex with its normal takes while a scene is loaded, bytes.

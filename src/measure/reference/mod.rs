@@ -6,7 +6,7 @@ pub mod noise;
 
 pub use noise::Noise;
 
-use crate::measure::image_file;
+use crate::measure::image_file::{self, Marked};
 use crate::measure::metrics::{self, ErrorMetrics, Mask};
 use crate::render::film::Image;
 use crate::scene::built_in;
@@ -64,7 +64,8 @@ impl Reference {
     /// # Errors
     /// A file that cannot be read, or a mask of another size.
     pub fn from_files(reference: &Path, mask: Option<&Path>) -> Result<Self, String> {
-        let (image, facts, odd) = image_file::read_reference(reference).map_err(|e| e.to_string())?;
+        let Marked { image, facts, not_finite: odd } =
+            image_file::read_reference(reference).map_err(|e| e.to_string())?;
         let mut mask = match mask {
             Some(path) => image_file::read_mask(path).map_err(|e| e.to_string())?,
             None => Mask::all(image.size),

@@ -280,8 +280,7 @@ impl<'a> Loader<'a> {
     fn check_light(&self, key: &str, light: &Light) -> Checked<()> {
         let (flux, radiance) = (light.flux(), light.radiance());
         for (value, what, unit) in [(flux, "flux", "W"), (radiance, "radiance", "W/(m² sr)")] {
-            // Not `largest > MAX_FLUX`: what is no number must not pass.
-            if !(value.max_element() <= MAX_FLUX) {
+            if !value.is_finite() || value.max_element() > MAX_FLUX {
                 let larger = if what == "flux" { "smaller" } else { "larger" };
                 return self.wrong(
                     key,
