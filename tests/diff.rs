@@ -192,18 +192,14 @@ fn a_png_is_compared_as_linear_values() {
 #[test]
 fn wrong_calls_are_refused_in_one_line() {
     let folder = tempfile::tempdir().expect("a folder");
-    let [a, b] = pair();
-    let mut broken = b;
-    broken.pixels[16 * 3 + 5].y = f32::NAN;
+    let [a, _] = pair();
     let a = write(folder.path(), "a.exr", &a);
-    let broken = write(folder.path(), "broken.exr", &broken);
     let small = write(folder.path(), "small.exr", &Image::black([4, 3]));
     let no_image = folder.path().join("c.exr");
     std::fs::write(&no_image, "words").expect("writes");
     let (a, small) = (path(&a), path(&small));
     refused(&["diff", a, small], "a.exr has 16x12 pixels");
     refused(&["diff", a, "nowhere.exr"], "nowhere.exr: no such file");
-    refused(&["diff", a, path(&broken)], "broken.exr: pixel 5,3 is not finite");
     refused(&["diff", a, path(&no_image)], "neither an EXR nor a PNG");
     refused(&["diff", a], "<REFERENCE>");
     refused(&["diff", a, a, "-o", "d.jpg"], ".exr or .png");

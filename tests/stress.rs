@@ -2,7 +2,8 @@
 
 #![allow(clippy::expect_used, missing_docs, reason = "a failed expectation is how this program reports")]
 
-use cusp::measure::stability::{Case, Verdict, cases};
+use cusp::export::stability::all_cases;
+use cusp::measure::stability::{Case, Verdict};
 use std::process::{Command, Output};
 
 fn stress(args: &[&str]) -> Output {
@@ -17,7 +18,7 @@ fn text(bytes: &[u8]) -> String {
 #[test]
 fn every_case_holds() {
     let mut failed = Vec::new();
-    for case in cases() {
+    for case in all_cases() {
         let judged = case.judge();
         if judged.verdict() != Verdict::Holds {
             failed.push(format!("{}: {:?}", case.name, judged.outcome));
@@ -69,7 +70,7 @@ fn an_unknown_case_is_named() {
     let error = text(&run.stderr);
     assert!(error.contains("`ellipsis`") && error.contains("--list") && error.lines().count() == 1, "{error}");
     let list = stress(&["--list"]);
-    assert!(cases().iter().all(|c| text(&list.stdout).contains(c.name)));
+    assert!(all_cases().iter().all(|c| text(&list.stdout).contains(c.name)));
 }
 
 /// The table in `docs/stability.md` is that of the cases, with their limits.
@@ -77,7 +78,7 @@ fn an_unknown_case_is_named() {
 fn the_document_lists_every_case() {
     let document = include_str!("../docs/stability.md");
     let row = |c: &Case| format!("| `{}` | {} | {} | {} |", c.name, c.what, c.range, c.oracle);
-    for case in cases() {
+    for case in all_cases() {
         let line = document.lines().find(|l| l.starts_with(&row(&case)));
         let line = line.unwrap_or_else(|| panic!("no row `{}`; `cusp stress --out DIR` writes the table", row(&case)));
         assert!(line.ends_with("| holds |"), "{line}");

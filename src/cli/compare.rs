@@ -21,12 +21,13 @@ use crate::measure::truth::{TRUTH_RAYS, truth};
 use crate::measure::window::{busiest_window, contours, disagreement};
 use crate::render::Step;
 use crate::render::film::{Image, Rect};
+use crate::render::memory::check_images;
 use crate::render::photon_pass::PhotonMaps;
 use crate::render::plan::Slot;
 use crate::render::settings::{Gather, LightPart, PlanMode, RenderSettings};
 use crate::render::tiles::tiles;
 use crate::render::{Plan, Renderer};
-use crate::scene::{built_in, open};
+use crate::scene::{built_in, memory, open};
 use clap::{Args, ValueEnum};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -99,6 +100,15 @@ pub fn run(args: &CompareArgs) -> Result<(), Failure> {
     args.flags.on_threads(|| Comparison::prepare(args)?.run())
 }
 
+/// Makes sure that a sheet of so many enlarged crops side by side, each with its error below, can be had.
+fn check_sheet(crop: Rect, enlarge: u32, columns: usize) -> Result<(), Failure> {
+    let [width, height] = [crop.width, crop.height].map(|n| u64::from(n) * u64::from(enlarge));
+    // Three bytes for each pixel, once in the sheet and once as it is encoded; images and labels come on top.
+    let pixels = width.saturating_mul(2 * height).saturating_mul(columns as u64);
+    let asked = format!("a sheet of {columns} crops of {width}x{height} pixels");
+    Ok(memory::check(asked, memory::bytes(pixels, 6), "lower --enlarge (enlarge) or --crop (crop)")?)
+}
+
 struct Comparison<'a> {
     args: &'a CompareArgs,
     crop: Option<Rect>,
@@ -143,6 +153,10 @@ impl<'a> Comparison<'a> {
         if let Some(crop) = crop {
             check_crop(crop, settings.size)?;
         }
+        let enlarge = args.enlarge.unwrap_or(session.enlarge);
+        if let Some(crop) = crop {
+            check_sheet(crop, enlarge, estimators.len())?;
+        }
         let given = args.reference.clone().or(session.reference.as_ref().map(PathBuf::from));
         let mask = if args.reference.is_some() { args.mask.clone() } else { session.mask.as_ref().map(PathBuf::from) };
         let reference = match &given {
@@ -175,17 +189,10 @@ impl<'a> Comparison<'a> {
         let regular = Regular::with_rays(TRUTH_RAYS);
         let truth = [Slot { estimator: &regular, gather: settings.gather }];
         let also: &[Slot] = if args.truth == Truth::None { &[] } else { &truth };
-        let renderer = Renderer::planned_for(Arc::new(scene), settings, estimators, also);
-        Ok(Self {
-            args,
-            crop,
-            enlarge: args.enlarge.unwrap_or(session.enlarge),
-            renderer,
-            reference,
-            notes,
-            start,
-            load,
-        })
+        check_images(&settings, estimators.len())?;
+        let mut renderer = Renderer::planned_for(Arc::new(scene), settings, estimators, also);
+        renderer.check_memory()?;
+        Ok(Self { args, crop, enlarge, renderer, reference, notes, start, load })
     }
 
     fn run(mut self) -> Result<(), Failure> {

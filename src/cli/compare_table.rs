@@ -3,6 +3,7 @@
 use crate::cli::table::{Table, percent};
 use crate::export::report::CompareReport;
 use crate::measure::truth::TRUTH_RAYS;
+use crate::scene::memory;
 use std::path::Path;
 
 /// The table for people.
@@ -70,6 +71,14 @@ pub fn text(report: &CompareReport, folder: &Path) -> String {
             item.part,
             if item.on { "on" } else { "left out" },
             item.why
+        ));
+    }
+    if let Some(m) = &r.memory {
+        let [all, images, photons, maps] = [m.total(), m.images, m.photons, m.maps].map(memory::text);
+        let peak = r.peak_rss_bytes.map_or(String::new(), |p| format!("; {} at the highest", memory::text(p)));
+        out.push_str(&format!(
+            "  memory: {all} foreseen: images {images}, {} photons {photons}, maps {maps}{peak}\n",
+            m.photons_stored
         ));
     }
     if let Some(cost) = &report.plan_cost {

@@ -9,8 +9,10 @@ use crate::export::provenance::command_line;
 use crate::export::text::Canvas;
 use crate::export::whole_file::WriteError;
 use crate::export::{exr_file, png_file};
+use crate::math::rgb::Rgb;
 use crate::measure::difference::{channels, difference, quantile_range};
 use crate::measure::flip::{Flip, FlipView, MAX_STOPS, PIXELS_PER_DEGREE, exposure_factor, flip};
+use crate::measure::image_file::NotFinite;
 use crate::measure::metrics::compare;
 use crate::measure::{Difference, ErrorMetrics, Mask, image_file};
 use crate::render::film::{Image, Rect};
@@ -78,6 +80,8 @@ struct DiffReport<'a> {
     size: [u32; 2],
     crop: Option<Rect>,
     mask: Option<&'a Path>,
+    /// Pixels left out because they are not finite, in the image and in the reference.
+    not_finite: [u64; 2],
     metrics: ErrorMetrics,
     flip: FlipReport,
     difference: Option<DifferenceFile<'a>>,
@@ -131,6 +135,7 @@ pub fn run(args: &DiffArgs) -> Result<(), Failure> {
         size: pair.image.size,
         crop: args.crop,
         mask: args.mask.as_deref(),
+        not_finite: pair.not_finite,
         metrics,
         flip: FlipReport {
             mean,
@@ -145,6 +150,9 @@ pub fn run(args: &DiffArgs) -> Result<(), Failure> {
     } else if args.quiet {
         Ok(())
     } else {
+        for warning in &pair.warnings {
+            eprintln!("warning: {warning}");
+        }
         print(&text(&report))
     }
 }
@@ -174,12 +182,17 @@ struct Pair {
     image: Image,
     reference: Image,
     mask: Mask,
+    /// Pixels of each that are not finite. They are black in both, and do not count.
+    not_finite: [u64; 2],
+    warnings: Vec<String>,
 }
 
 impl Pair {
     fn read(args: &DiffArgs) -> Result<Self, Failure> {
-        let read = |path| image_file::read(path).map_err(|e| Failure::Call(e.to_string()));
-        let (image, reference) = (read(&args.image)?, read(&args.reference)?);
+        let read = |path| image_file::read_reference(path).map_err(|e| Failure::Call(e.to_string()));
+        let (read_image, read_reference) = (read(&args.image)?, read(&args.reference)?);
+        let (odd, odd_reference) = (read_image.not_finite, read_reference.not_finite);
+        let (mut image, mut reference) = (read_image.image, read_reference.image);
         same_size(&args.image, image.size, &args.reference, reference.size)?;
         let mut mask = match &args.mask {
             Some(path) => image_file::read_mask(path).map_err(|e| Failure::Call(e.to_string()))?,
@@ -192,7 +205,17 @@ impl Pair {
             check_crop(crop, image.size)?;
             mask = mask.within(crop);
         }
-        Ok(Self { image, reference, mask })
+        let mut warnings = Vec::new();
+        let mut leave_out = |path: &Path, odd: Option<NotFinite>| {
+            let Some(odd) = odd else { return 0 };
+            mask.leave_out(&odd.pixels);
+            let pixels = image.pixels.iter_mut().zip(&mut reference.pixels).zip(&odd.pixels);
+            pixels.filter(|(_, out)| **out).for_each(|((a, b), _)| (*a, *b) = (Rgb::ZERO, Rgb::ZERO));
+            warnings.push(format!("{}: {odd}; left out", path.display()));
+            odd.count
+        };
+        let not_finite = [leave_out(&args.image, odd), leave_out(&args.reference, odd_reference)];
+        Ok(Self { image, reference, mask, not_finite, warnings })
     }
 
     /// Writes the difference image, of the crop if there is one.

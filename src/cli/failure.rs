@@ -4,6 +4,7 @@ use crate::estimate::settings::SpecError;
 use crate::export::whole_file::WriteError;
 use crate::render::settings::SettingError;
 use crate::scene::SceneError;
+use crate::scene::memory::Shortage;
 
 /// A failure of a command; its text is one line.
 #[derive(Debug, thiserror::Error)]
@@ -44,6 +45,12 @@ impl From<SettingError> for Failure {
 
 impl From<SpecError> for Failure {
     fn from(e: SpecError) -> Self {
+        Self::Call(e.to_string())
+    }
+}
+
+impl From<Shortage> for Failure {
+    fn from(e: Shortage) -> Self {
         Self::Call(e.to_string())
     }
 }

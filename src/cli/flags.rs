@@ -226,6 +226,8 @@ mod tests {
         assert_eq!(count("200000"), Ok(200_000));
         assert_eq!(count("2e5"), Ok(200_000));
         assert_eq!(count("-3"), Ok(-3));
+        assert_eq!(count("1e18"), Ok(1_000_000_000_000_000_000));
+        assert!(count("1e19").is_err());
         assert!(count("nan").is_err() && count("1.5").is_err() && count("").is_err());
         assert_eq!(size("640x480"), Ok([640, 480]));
         assert_eq!(pixel("3, 4"), Ok([3, 4]));

@@ -56,7 +56,7 @@ pub fn run(args: &InspectArgs) -> Result<(), Failure> {
         if args.pixel[0] >= size[0] || args.pixel[1] >= size[1] {
             return Err(wrong(&InspectError::Outside { pixel: args.pixel, size }));
         }
-        let pass = Pass::alone(Arc::new(scene), settings, &estimators, args.pass - 1, &interrupted)
+        let pass = Pass::alone(Arc::new(scene), settings, &estimators, args.pass - 1, &interrupted)?
             .ok_or_else(|| Failure::Interrupted("nothing was found out".into()))?;
         let mut found = inspect(&pass, &estimators, args.pixel).map_err(|e| wrong(&e))?;
         sort_rows(&mut found, sort);

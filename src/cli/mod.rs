@@ -119,7 +119,9 @@ fn one_line(error: &clap::Error) -> String {
 /// Anything else that the system refuses.
 fn print(text: &str) -> Result<(), Failure> {
     use std::io::Write;
-    match std::io::stdout().write_all(text.as_bytes()) {
+    let mut out = std::io::stdout();
+    // What is left in the buffer at the end would fail without a word.
+    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
         Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => Err(Failure::Work(format!("standard output: {e}"))),
         _ => Ok(()),
     }

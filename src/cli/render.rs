@@ -68,6 +68,7 @@ pub fn run(args: &RenderArgs) -> Result<(), Failure> {
         let stays = !chosen.is_consistent() || settings.gather == Gather::Knn;
         let load = start.elapsed().as_secs_f64();
         let mut renderer = Renderer::new(Arc::new(scene), settings, vec![chosen]);
+        renderer.check_memory()?;
         let rule = StopRule {
             passes: args.passes.or_else(|| (args.seconds.is_none() && args.until_error.is_none()).then_some(1)),
             seconds: args.seconds,

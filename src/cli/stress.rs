@@ -5,8 +5,9 @@ use crate::cli::progress::bar;
 use crate::cli::table::Table;
 use crate::cli::{print, to_json};
 use crate::export::provenance::command_line;
+use crate::export::stability::all_cases;
 use crate::export::whole_file;
-use crate::measure::stability::{self, Case, Judged, Verdict};
+use crate::measure::stability::{Case, Judged, Verdict};
 use clap::Args;
 use serde::Serialize;
 use std::fmt::Write;
@@ -82,7 +83,7 @@ impl CaseReport {
 /// # Errors
 /// An unknown name, a file that cannot be written, or a case that does not hold.
 pub fn run(args: &StressArgs) -> Result<(), Failure> {
-    let cases = chosen(&stability::cases(), &args.cases)?;
+    let cases = chosen(&all_cases(), &args.cases)?;
     if let Some(threads) = args.threads {
         // Fails only if there is a pool already, which then has all cores.
         let _ = rayon::ThreadPoolBuilder::new().num_threads(usize::from(threads)).build_global();
@@ -243,7 +244,7 @@ mod tests {
 
     #[test]
     fn names_are_unique_and_groups_are_together() {
-        let all = stability::cases();
+        let all = all_cases();
         for (i, c) in all.iter().enumerate() {
             assert!(all[..i].iter().all(|d| d.name != c.name), "{} is there twice", c.name);
             let first = all.iter().position(|d| d.group == c.group).expect("itself");
@@ -258,7 +259,7 @@ mod tests {
             Case { group: "g", name: "far-off", what: "w", range: "r", oracle: "o", limit: 0.1, run: Default::default };
         let seen = |worst| Judged {
             case,
-            outcome: stability::Outcome { tried: 1, worst, at: "there".into(), ..Default::default() },
+            outcome: crate::measure::stability::Outcome { tried: 1, worst, at: "there".into(), ..Default::default() },
             seconds: 0.0,
         };
         assert!(ending(&[seen(0.1)]).is_ok());
@@ -271,7 +272,7 @@ mod tests {
 
     #[test]
     fn cases_are_chosen_by_group_and_name() {
-        let all = stability::cases();
+        let all = all_cases();
         let named = |names: &[&str]| chosen(&all, &names.iter().map(|&n| n.to_owned()).collect::<Vec<_>>());
         assert_eq!(named(&[]).expect("all").len(), all.len());
         let some = named(&["passes", "ellipse"]).expect("known");

@@ -2,6 +2,7 @@
 
 use crate::export::Provenance;
 use crate::export::whole_file::{self, WriteError};
+use crate::measure::image_file::NotFinite;
 use crate::render::film::Image;
 use exr::prelude::{
     AttributeValue, Encoding, Image as ExrImage, Layer, LayerAttributes, SpecificChannels, Text, Vec2, WritableImage,
@@ -20,9 +21,12 @@ pub fn write(path: &Path, image: &Image, provenance: &Provenance) -> Result<(), 
 /// As [`write`], with these facts in the header.
 ///
 /// # Errors
-/// If the file cannot be written.
+/// If the file cannot be written, or a pixel is not finite: a film holds no such pixel, and nobody could use it.
 pub fn write_with(path: &Path, image: &Image, facts: &[(&str, String)]) -> Result<(), WriteError> {
     let wrong = |why: String| WriteError { path: path.to_owned(), why };
+    if let Some(odd) = NotFinite::of(image) {
+        return Err(wrong(format!("{odd}; this is a defect")));
+    }
     let [w, h] = image.size;
     let channels = SpecificChannels::rgb(|Vec2(x, y)| {
         let p = image.at(x as u32, y as u32);

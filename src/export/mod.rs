@@ -10,6 +10,7 @@ pub mod provenance;
 pub mod report;
 pub mod session;
 pub mod sheet;
+pub mod stability;
 pub mod study;
 pub mod text;
 pub mod timings;

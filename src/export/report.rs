@@ -3,6 +3,7 @@
 use crate::export::Provenance;
 use crate::measure::ErrorMetrics;
 use crate::render::film::Rect;
+use crate::render::memory::MemoryNeed;
 use crate::render::renderer::Renderer;
 use crate::render::settings::RenderSettings;
 use crate::render::stats::{Bounded, Seconds, StoredCounts, peak_rss_bytes};
@@ -41,6 +42,8 @@ pub struct RenderReport {
     pub error_estimate: Option<ErrorEstimate>,
     /// Peak resident memory, where the system tells.
     pub peak_rss_bytes: Option<u64>,
+    /// What a pass was expected to need of memory before it was begun.
+    pub memory: Option<MemoryNeed>,
     /// What was limited.
     pub bounded: Bounded,
     /// What was odd.
@@ -69,6 +72,7 @@ impl RenderReport {
             stopped_by: None,
             error_estimate: renderer.error_estimate(),
             peak_rss_bytes: peak_rss_bytes(),
+            memory: renderer.memory_need().copied(),
             bounded: *renderer.bounded(),
             warnings: renderer.warnings(),
             settings,

@@ -2,6 +2,7 @@
 
 use crate::estimate::{Estimator, registry};
 pub use crate::measure::difference::Difference;
+use crate::measure::flip::MAX_STOPS;
 use crate::render::StopRule;
 use crate::render::film::Rect;
 use crate::render::settings::PlanMode;
@@ -297,7 +298,11 @@ impl Session {
         Ok(session)
     }
 
-    fn parse(path: &Path, text: &str) -> Result<Self, SceneError> {
+    /// Reads a session from its text; `path` names it in errors. Paths in it stay as they are.
+    ///
+    /// # Errors
+    /// One line with file, line and key.
+    pub fn parse(path: &Path, text: &str) -> Result<Self, SceneError> {
         let locator = crate::scene::locate::Locator::new(path, text);
         let session: Self = toml::from_str(text).map_err(|e| locator.parse_error(&e))?;
         if session.session != VERSION {
@@ -311,6 +316,21 @@ impl Session {
         for (key, limit) in [("until_error", session.until_error), ("seconds", session.seconds)] {
             if limit.is_some_and(|l| !(l > 0.0 && l.is_finite())) {
                 return Err(locator.error(key, "must be positive and finite"));
+            }
+        }
+        let (tone, view) = (&session.tone, &session.view);
+        let range = tone.range.unwrap_or_default();
+        for (key, values, most) in [
+            ("tone.exposure", &[tone.exposure][..], MAX_STOPS),
+            ("tone.offset", &[tone.offset], f32::MAX),
+            ("tone.range", &range, f32::MAX),
+            ("comparison.divider", &[session.comparison.divider], f32::MAX),
+            ("view.zoom", &[view.zoom], f32::MAX),
+            ("view.center", &view.center, f32::MAX),
+        ] {
+            // Not `abs() > most`: what is no number must not pass.
+            if !values.iter().all(|v| v.abs() <= most) {
+                return Err(locator.error(key, format!("must be finite, and between -{most:e} and {most:e}")));
             }
         }
         if session.crop.is_some_and(|[_, _, width, height]| width == 0 || height == 0) {
@@ -473,6 +493,9 @@ mod tests {
             ("session = 1\nscene = \"ring\"\ncolour = 4", "colour"),
             ("session = 1\nscene = \"ring\"\nuntil_error = 0", "s.toml:3: until_error"),
             ("session = 1\nscene = \"ring\"\nseconds = nan", "s.toml:3: seconds"),
+            ("session = 1\nscene = \"ring\"\n[tone]\nexposure = 1e9", "s.toml:4: tone.exposure"),
+            ("session = 1\nscene = \"ring\"\n[tone]\nrange = [0, inf]", "s.toml:4: tone.range"),
+            ("session = 1\nscene = \"ring\"\n[view]\ncenter = [nan, 0]", "s.toml:4: view.center"),
             ("session = 1\nscene = \"ring\"\n[[panels]]\nestimator = \"sharp\"", "sharp"),
         ] {
             let error = Session::parse(Path::new("s.toml"), text).expect_err(text).to_string();

@@ -2,8 +2,9 @@
 
 use crate::export::text::{Canvas, Face};
 use crate::export::tone::Look;
-use crate::math::rgb::luminance;
+use crate::math::rgb::{Rgb, luminance};
 use crate::render::film::{Image, Rect};
+use glam::DVec3;
 
 /// One estimator's column.
 pub struct Column {
@@ -147,9 +148,13 @@ fn frame(canvas: &mut Canvas, x: u32, y: u32, crop: Rect, size: [u32; 2], shown:
 
 /// `image - truth` over the truth's mean, for [`Column::error`]; 0 for a black truth. Both have the same size.
 pub fn signed_error(image: &Image, truth: &Image) -> Image {
-    let mean = truth.pixels.iter().map(|p| crate::math::rgb::mean(*p)).sum::<f32>() / truth.pixels.len().max(1) as f32;
+    // In 64 bits: sums and differences of the largest numbers are none in 32.
+    let sum: f64 = truth.pixels.iter().map(|p| p.as_dvec3().element_sum()).sum();
+    let mean = sum / (3 * truth.pixels.len().max(1)) as f64;
     let scale = if mean > 0.0 { 1.0 / mean } else { 0.0 };
-    Image { size: image.size, pixels: image.pixels.iter().zip(&truth.pixels).map(|(x, t)| (*x - *t) * scale).collect() }
+    let largest = DVec3::splat(f64::from(f32::MAX));
+    let error = |x: Rgb, t: Rgb| ((x.as_dvec3() - t.as_dvec3()) * scale).clamp(-largest, largest).as_vec3();
+    Image { size: image.size, pixels: image.pixels.iter().zip(&truth.pixels).map(|(x, t)| error(*x, *t)).collect() }
 }
 
 /// Signed values in [-1, 1] as blue, grey, orange.
@@ -158,7 +163,8 @@ fn signed_colors(error: &Image) -> Vec<u8> {
         .pixels
         .iter()
         .flat_map(|p| {
-            let e = luminance(*p).clamp(-1.0, 1.0);
+            // Each channel first: a sum of the largest numbers of both signs is none.
+            let e = luminance(p.clamp(Rgb::splat(-1e6), Rgb::splat(1e6))).clamp(-1.0, 1.0);
             let to: [f32; 3] = if e > 0.0 { [255.0, 150.0, 30.0] } else { [60.0, 150.0, 255.0] };
             let t = e.abs();
             [0, 1, 2].map(|i| (40.0 * (1.0 - t) + to[i] * t + 0.5) as u8)

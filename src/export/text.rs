@@ -28,8 +28,8 @@ impl Canvas {
 
     /// Fills a rectangle; what lies outside the canvas is left out.
     pub fn fill(&mut self, x: u32, y: u32, width: u32, height: u32, color: [u8; 3]) {
-        for j in y..(y + height).min(self.size[1]) {
-            for i in x..(x + width).min(self.size[0]) {
+        for j in y..y.saturating_add(height).min(self.size[1]) {
+            for i in x..x.saturating_add(width).min(self.size[0]) {
                 self.set(i, j, color);
             }
         }
@@ -39,7 +39,7 @@ impl Canvas {
     pub fn paste(&mut self, x: u32, y: u32, size: [u32; 2], rgb: &[u8], factor: u32) {
         for j in 0..size[1] * factor {
             for i in 0..size[0] * factor {
-                let from = 3 * ((j / factor) * size[0] + i / factor) as usize;
+                let from = 3 * ((j / factor) as usize * size[0] as usize + (i / factor) as usize);
                 if x + i < self.size[0] && y + j < self.size[1] {
                     self.set(x + i, y + j, [rgb[from], rgb[from + 1], rgb[from + 2]]);
                 }
@@ -61,8 +61,13 @@ impl Canvas {
         Self { size: [width, self.size[1] + other.size[1]], rgb }
     }
 
+    /// Where the bytes of a pixel begin.
+    fn place(&self, x: u32, y: u32) -> usize {
+        3 * (y as usize * self.size[0] as usize + x as usize)
+    }
+
     fn set(&mut self, x: u32, y: u32, color: [u8; 3]) {
-        let at = 3 * (y * self.size[0] + x) as usize;
+        let at = self.place(x, y);
         self.rgb[at..at + 3].copy_from_slice(&color);
     }
 
@@ -93,7 +98,7 @@ impl Canvas {
     }
 
     fn blend(&mut self, x: u32, y: u32, color: [u8; 3], coverage: f32) {
-        let at = 3 * (y * self.size[0] + x) as usize;
+        let at = self.place(x, y);
         let c = coverage.clamp(0.0, 1.0);
         for (under, over) in self.rgb[at..at + 3].iter_mut().zip(color) {
             *under = (f32::from(*under) * (1.0 - c) + f32::from(over) * c + 0.5) as u8;

@@ -10,18 +10,20 @@ use std::sync::LazyLock;
 /// Part of the pixels that may be brighter than white: a lamp in view should not darken what it lights.
 const CLIPPED: f64 = 0.02;
 
-/// Factor that brings the brightest pixels, but for the top two per cent, to white. 1 for a black image.
+/// Factor that brings the brightest pixels, but for the top two per cent, to white. 1 for a black image. Pixels that are
+/// not finite have no say.
 ///
 /// The same factor serves all images that are compared; take it from one of them.
 pub fn auto_exposure(image: &Image) -> f32 {
-    let mut values: Vec<f32> = image.pixels.iter().map(|p| luminance(*p)).collect();
+    let mut values: Vec<f32> = image.pixels.iter().map(|p| luminance(*p)).filter(|l| l.is_finite()).collect();
     if values.is_empty() {
         return 1.0;
     }
     let last = values.len() - 1;
     let at = ((1.0 - CLIPPED) * last as f64) as usize;
     let (_, value, _) = values.select_nth_unstable_by(at, f32::total_cmp);
-    if *value > 0.0 && value.is_finite() { 1.0 / *value } else { 1.0 }
+    // The reciprocal of a denormal is beyond 32 bits.
+    if *value > 0.0 { (1.0 / *value).min(f32::MAX) } else { 1.0 }
 }
 
 /// The image times `exposure` through the sRGB curve (IEC 61966-2-1), three bytes for each pixel.
@@ -86,10 +88,16 @@ impl Default for SrgbTable {
     }
 }
 
-/// The curve x/(1 + x) on the luminance, colours kept (Reinhard et al. 2002, eq. 3). Negative values stay as they are.
+/// The curve x/(1 + x) on the luminance, colours kept (Reinhard et al. 2002, eq. 3). Negative values stay as they are; of
+/// infinite ones only these count, and become 1.
 pub fn reinhard(x: Rgb) -> Rgb {
-    let l = luminance(x);
-    if l > 0.0 { x / (1.0 + l) } else { x }
+    if x.max_element() == f32::INFINITY {
+        return Rgb::from_array(x.to_array().map(|v| if v == f32::INFINITY { 1.0 } else { v.min(0.0) }));
+    }
+    let wide = x.as_dvec3();
+    // In 64 bits, where the luminance of the largest numbers is one.
+    let l = 0.2126 * wide.x + 0.7152 * wide.y + 0.0722 * wide.z;
+    if l > 0.0 { (wide / (1.0 + l)).as_vec3() } else { x }
 }
 
 /// The colour map of that name; the first for a name that is none.
@@ -135,7 +143,8 @@ impl ToneMap {
         self.scale.as_ref()
     }
 
-    /// The three bytes of a radiance.
+    /// The three bytes of a radiance. Below 0 is black, above 1 and NaN white, under every curve; false colour shows NaN
+    /// as the low end.
     pub fn bytes(&self, table: &SrgbTable, radiance: Rgb) -> [u8; 3] {
         if let Some(scale) = &self.scale {
             return scale.color(luminance(radiance));
@@ -144,10 +153,11 @@ impl ToneMap {
         if self.curve == Curve::Reinhard {
             x = reinhard(x);
         }
+        let unit = |v: f32| if v.is_nan() { 1.0 } else { v.clamp(0.0, 1.0) };
         let byte = |v: f32| match self.curve {
             Curve::Srgb | Curve::Reinhard => table.byte(v),
-            Curve::Gamma => (libm::powf(v.clamp(0.0, 1.0), 1.0 / 2.2) * 255.0 + 0.5) as u8,
-            Curve::Linear => (v.clamp(0.0, 1.0) * 255.0 + 0.5) as u8,
+            Curve::Gamma => (libm::powf(unit(v), 1.0 / 2.2) * 255.0 + 0.5) as u8,
+            Curve::Linear => (unit(v) * 255.0 + 0.5) as u8,
         };
         x.to_array().map(byte)
     }

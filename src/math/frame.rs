@@ -1,7 +1,7 @@
 //! Orthonormal frames and the maps from the unit square to directions and discs.
 
 use crate::math::elementary::sin_cos;
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use std::f32::consts::{PI, TAU};
 
 /// Two unit vectors that make a right-handed frame with the unit vector `n`: `(t, b)` with `t × b = n`.
@@ -52,6 +52,12 @@ pub fn unit_or(v: Vec3, fallback: Vec3) -> Vec3 {
     if m > 0.0 && m.is_finite() { (v / m).normalize() } else { fallback }
 }
 
+/// The unit vector along `v` however long or short it is; None if `v` has no direction (zero, or not finite).
+pub fn unit(v: DVec3) -> Option<DVec3> {
+    let m = v.abs().max_element();
+    (m > 0.0 && m.is_finite()).then(|| (v / m).normalize())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -95,5 +101,8 @@ mod tests {
         assert_eq!(unit_or(Vec3::splat(f32::NAN), Vec3::Y), Vec3::Y);
         assert_eq!(unit_or(Vec3::new(1e-38, 0.0, 0.0), Vec3::Y), Vec3::X);
         assert_eq!(unit_or(Vec3::new(0.0, 0.0, -3e38), Vec3::Y), Vec3::NEG_Z);
+        assert_eq!(unit(DVec3::X * 5e-324), Some(DVec3::X));
+        assert_eq!(unit(DVec3::Z * -1e308), Some(DVec3::NEG_Z));
+        assert!(unit(DVec3::ZERO).is_none() && unit(DVec3::splat(f64::INFINITY)).is_none());
     }
 }

@@ -1,6 +1,7 @@
 //! Difference of an image from a reference, pixel by pixel.
 
 use crate::measure::flip::{FlipView, flip};
+use crate::measure::image_file::NotFinite;
 use crate::render::film::Image;
 use glam::{DVec3, Vec3};
 
@@ -51,7 +52,7 @@ impl Difference {
 ///
 /// * `exposure`: stops, for [`Difference::Flip`] alone.
 ///
-/// Finite for finite images.
+/// Finite; images that are not are refused.
 ///
 /// # Errors
 /// If sizes differ, or the exposure is out of range.
@@ -66,7 +67,7 @@ pub fn difference(kind: Difference, image: &Image, reference: &Image, exposure: 
 ///
 /// * `exposure`: stops, for [`Difference::Flip`] alone.
 ///
-/// Finite for finite images.
+/// Finite; images that are not are refused.
 ///
 /// # Errors
 /// If sizes differ, or the exposure is out of range.
@@ -102,6 +103,11 @@ fn channel_values<'a>(
 ) -> Result<impl Iterator<Item = DVec3> + 'a, String> {
     if image.size != reference.size {
         return Err(format!("sizes differ: image {:?}, reference {:?}", image.size, reference.size));
+    }
+    for (what, of) in [("image", image), ("reference", reference)] {
+        if let Some(odd) = NotFinite::of(of) {
+            return Err(format!("the {what}: {odd}; mend it first"));
+        }
     }
     let n = 3.0 * reference.pixels.len().max(1) as f64;
     let sum: f64 = reference.pixels.iter().map(|r| r.as_dvec3().abs().element_sum()).sum();

@@ -3,8 +3,10 @@
 use crate::math::rgb::Rgb;
 use crate::measure::{Mask, exr_header};
 use crate::render::film::Image;
+use crate::scene::memory;
 use crate::scene::texture::srgb_to_linear;
-use image::{ColorType, DynamicImage, ImageFormat};
+use image::{ColorType, DynamicImage, ImageFormat, ImageReader};
+use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
 /// A file that cannot be read as an image; one line.
@@ -28,13 +30,63 @@ pub fn read(path: &Path) -> Result<Image, ReadError> {
     bytes_of(path).and_then(|bytes| decode(&bytes)).map_err(|why| ReadError { path: path.to_owned(), why })
 }
 
-/// As [`read`], with the facts that Cusp writes into the header of an EXR file; a PNG has none.
+/// Pixels of an image that are not finite: in some channel NaN or an infinity.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NotFinite {
+    /// Whether each pixel is one, row by row.
+    pub pixels: Vec<bool>,
+    /// How many there are; at least one.
+    pub count: u64,
+    /// Column and row of the first.
+    pub first: [u32; 2],
+    /// Its value.
+    pub value: Rgb,
+}
+
+impl NotFinite {
+    /// Those of an image; None if it has none.
+    pub fn of(image: &Image) -> Option<Self> {
+        let pixels: Vec<bool> = image.pixels.iter().map(|p| !p.is_finite()).collect();
+        let at = pixels.iter().position(|p| *p)?;
+        let count = pixels.iter().filter(|p| **p).count() as u64;
+        let (at32, width) = (at as u64, u64::from(image.size[0]));
+        Some(Self { pixels, count, first: [(at32 % width) as u32, (at32 / width) as u32], value: image.pixels[at] })
+    }
+}
+
+impl std::fmt::Display for NotFinite {
+    /// How many, where, and what; no more than a part of a line.
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        let (n, [x, y], v) = (self.count, self.first, self.value);
+        let pixels = if n == 1 { "1 pixel is".into() } else { format!("{n} pixels are") };
+        write!(f, "{pixels} not finite, the first at {x},{y} (R {}, G {}, B {})", v.x, v.y, v.z)
+    }
+}
+
+/// An image that others are compared with, as [`read_reference`] reads it.
+#[derive(Clone, Debug)]
+pub struct Marked {
+    /// The image; black where a pixel is not finite.
+    pub image: Image,
+    /// Facts that Cusp wrote into the header of an EXR file; a PNG has none.
+    pub facts: Vec<(String, String)>,
+    /// Pixels that are not finite in the file.
+    pub not_finite: Option<NotFinite>,
+}
+
+/// As [`read`] for an image that others are compared with: pixels that are not finite are
+/// made black and told of instead, so that they can be left out of all counts.
 ///
 /// # Errors
-/// As for [`read`].
-pub fn read_with_facts(path: &Path) -> Result<(Image, Vec<(String, String)>), ReadError> {
-    let both = bytes_of(path).and_then(|bytes| Ok((decode(&bytes)?, exr_header::facts(&bytes))));
-    both.map_err(|why| ReadError { path: path.to_owned(), why })
+/// As for [`read`], but for these pixels.
+pub fn read_reference(path: &Path) -> Result<Marked, ReadError> {
+    let both = bytes_of(path).and_then(|bytes| Ok((decode_any(&bytes)?, exr_header::facts(&bytes))));
+    let (mut image, facts) = both.map_err(|why| ReadError { path: path.to_owned(), why })?;
+    let odd = NotFinite::of(&image);
+    if let Some(odd) = &odd {
+        image.pixels.iter_mut().zip(&odd.pixels).filter(|(_, o)| **o).for_each(|(p, _)| *p = Rgb::ZERO);
+    }
+    Ok(Marked { image, facts, not_finite: odd })
 }
 
 /// Reads a mask: pixels of 50 % grey and brighter count.
@@ -50,22 +102,23 @@ pub fn read_mask(path: &Path) -> Result<Mask, ReadError> {
 /// # Errors
 /// As for [`read`], without the file's name.
 pub fn decode(bytes: &[u8]) -> Result<Image, String> {
+    let image = decode_any(bytes)?;
+    match NotFinite::of(&image) {
+        Some(odd) => Err(format!("{odd}; mend the image first")),
+        None => Ok(image),
+    }
+}
+
+/// As [`decode`], whatever its pixels are.
+fn decode_any(bytes: &[u8]) -> Result<Image, String> {
     let (decoded, format) = load(bytes)?;
-    let image = match format {
+    Ok(match format {
         ImageFormat::Png => from_srgb(&decoded),
         _ => {
             let rgb = decoded.to_rgb32f();
             Image { size: [rgb.width(), rgb.height()], pixels: rgb.pixels().map(|p| p.0.into()).collect() }
         }
-    };
-    match image.pixels.iter().position(|p| !p.is_finite()) {
-        Some(at) => {
-            let (x, y) = (at as u32 % image.size[0], at as u32 / image.size[0]);
-            let p = image.pixels[at];
-            Err(format!("pixel {x},{y} is not finite (R {}, G {}, B {}); mend the image first", p.x, p.y, p.z))
-        }
-        None => Ok(image),
-    }
+    })
 }
 
 /// As [`read_mask`], from the bytes of a file.
@@ -78,10 +131,18 @@ pub fn decode_mask(bytes: &[u8]) -> Result<Mask, String> {
 }
 
 fn bytes_of(path: &Path) -> Result<Vec<u8>, String> {
-    std::fs::read(path).map_err(|e| match e.kind() {
+    let system = |e: std::io::Error| match e.kind() {
         std::io::ErrorKind::NotFound => "no such file".into(),
         _ => e.to_string(),
-    })
+    };
+    // A device or a pipe may never end.
+    let about = std::fs::metadata(path).map_err(system)?;
+    if !about.is_file() {
+        return Err("is no plain file".into());
+    }
+    memory::check(format!("its {} bytes", about.len()), about.len(), "give a smaller file")
+        .map_err(|e| e.to_string())?;
+    std::fs::read(path).map_err(system)
 }
 
 fn load(bytes: &[u8]) -> Result<(DynamicImage, ImageFormat), String> {
@@ -90,8 +151,15 @@ fn load(bytes: &[u8]) -> Result<(DynamicImage, ImageFormat), String> {
         _ => return Err("is neither an EXR nor a PNG file".into()),
     };
     let one_line = |e: image::ImageError| e.to_string().split_whitespace().collect::<Vec<_>>().join(" ");
-    let decoded = image::load_from_memory_with_format(bytes, format).map_err(one_line)?;
-    Ok((decoded, format))
+    let reader = || ImageReader::with_format(Cursor::new(bytes), format);
+    let (width, height) = reader().into_dimensions().map_err(one_line)?;
+    // Four channels of 32 bits as it is decoded, then three of them twice.
+    let needed = memory::bytes(u64::from(width) * u64::from(height), 4 * size_of::<f32>() + 2 * size_of::<Rgb>());
+    memory::check(format!("{width}x{height} pixels"), needed, "give a smaller image").map_err(|e| e.to_string())?;
+    let mut reader = reader();
+    // The library's own limit is lower than the largest image that can be rendered.
+    reader.no_limits();
+    Ok((reader.decode().map_err(one_line)?, format))
 }
 
 /// Eight bits keep their exact table; more bits are decoded one by one.
@@ -114,7 +182,6 @@ fn from_srgb(image: &DynamicImage) -> Image {
 mod tests {
     use super::*;
     use image::{ImageBuffer, Luma, Rgb as Pixel};
-    use std::io::Cursor;
 
     fn encoded(image: &DynamicImage, format: ImageFormat) -> Vec<u8> {
         let mut bytes = Cursor::new(Vec::new());
@@ -145,7 +212,7 @@ mod tests {
         assert_eq!((image.at(0, 0).to_array(), image.at(1, 1).y), ([-1.5, 1e-20, 4e5], 2.0));
         for odd in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
             let why = decode(&exr(odd)).expect_err("not finite");
-            assert!(why.starts_with("pixel 1,1 is not finite"), "{why}");
+            assert!(why.starts_with("1 pixel is not finite, the first at 1,1 (R 0, G "), "{why}");
         }
     }
 

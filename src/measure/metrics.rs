@@ -16,6 +16,11 @@ pub struct Mask {
 }
 
 impl Mask {
+    /// Lets those pixels count no more that are marked, row by row.
+    pub fn leave_out(&mut self, pixels: &[bool]) {
+        self.counts.iter_mut().zip(pixels).for_each(|(counts, out)| *counts &= !out);
+    }
+
     /// All pixels.
     pub fn all(size: [u32; 2]) -> Self {
         Self { size, counts: vec![true; size[0] as usize * size[1] as usize] }
@@ -65,7 +70,7 @@ pub struct ErrorMetrics {
 /// Compares images of the same size.
 ///
 /// # Errors
-/// If sizes differ or no pixel counts.
+/// If sizes differ, no pixel counts, or a pixel that counts is not finite: the first of them is named.
 pub fn compare(image: &Image, reference: &Image, mask: &Mask) -> Result<ErrorMetrics, String> {
     if image.size != reference.size || mask.size != image.size {
         return Err(format!(
@@ -85,6 +90,14 @@ pub fn compare(image: &Image, reference: &Image, mask: &Mask) -> Result<ErrorMet
     let pixels = counted().count() as u64;
     if pixels == 0 {
         return Err("the mask leaves no pixel".into());
+    }
+    for (what, of) in [("image", image), ("reference", reference)] {
+        let is_odd = |(i, p): (usize, &Rgb)| mask.counts[i] && !p.is_finite();
+        if let Some((i, p)) = of.pixels.iter().enumerate().find(|(i, p)| is_odd((*i, p))) {
+            let (x, y) = (i % of.size[0] as usize, i / of.size[0] as usize);
+            let [r, g, b] = p.to_array();
+            return Err(format!("pixel {x},{y} of the {what} is not finite (R {r}, G {g}, B {b}); mask it out"));
+        }
     }
     let n = 3.0 * pixels as f64;
     let mean = |f: fn(DVec3, DVec3) -> DVec3| counted().map(|(x, r)| f(x, r).element_sum()).sum::<f64>() / n;

@@ -64,9 +64,17 @@ pub fn busiest_window(interest: &Interest, size: [u32; 2]) -> Rect {
     Rect { x: best.1, y: best.2, width, height }
 }
 
-/// From 0 to 1, so that one bright spot does not outweigh a long contour.
+/// From 0 to 1, so that one bright spot does not outweigh a long contour. What is negative or no number is 0.
 fn compressed(luminance: f32, middle: f32) -> f64 {
-    f64::from(luminance / (luminance + middle.max(f32::MIN_POSITIVE)))
+    // In 64 bits, where the sum of two of the largest numbers is one.
+    let (l, middle) = (f64::from(luminance), f64::from(middle).max(f64::from(f32::MIN_POSITIVE)));
+    if l == f64::INFINITY {
+        1.0
+    } else if l > 0.0 {
+        l / (l + middle)
+    } else {
+        0.0
+    }
 }
 
 fn mean_luminance(image: &Image) -> f32 {

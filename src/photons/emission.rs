@@ -1,7 +1,7 @@
 //! Emission: how many photons each light sends out, and how each of them starts.
 
 use crate::math::elementary::pow;
-use crate::math::frame::{concentric_disc, cosine_hemisphere, direction, tangents, uniform_sphere};
+use crate::math::frame::{concentric_disc, cosine_hemisphere, direction, tangents, uniform_sphere, unit};
 use crate::math::rgb::{Rgb, mean};
 use crate::math::sequence::Sequence;
 use crate::scene::{Light, Scene};
@@ -96,7 +96,7 @@ pub fn emit(scene: &Scene, light: &Light, count: u64, x: [f32; 4]) -> Emission {
         }
         Light::Quad { center, u, v, .. } => {
             let position = *center + *u * (2.0 * x[0] - 1.0) + *v * (2.0 * x[1] - 1.0);
-            from_surface(position, u.cross(*v).normalize())
+            from_surface(position, quad_normal(*u, *v))
         }
         Light::Mesh { triangles, cumulative_area, .. } => {
             let (position, normal) = sample_triangles(triangles, cumulative_area, x[0], x[1]);
@@ -114,6 +114,11 @@ pub fn emit(scene: &Scene, light: &Light, count: u64, x: [f32; 4]) -> Emission {
             }
         }
     }
+}
+
+/// Unit normal of the front of a parallelogram; in f64, where the cross product of short or long edges keeps its length.
+pub fn quad_normal(u: Vec3, v: Vec3) -> Vec3 {
+    unit(u.as_dvec3().cross(v.as_dvec3())).map_or(Vec3::Y, |n| n.as_vec3())
 }
 
 /// Solid angle that one of `n` cosine-weighted photons owns, `π/(n cos θ)`, and whether it was bounded.
@@ -154,7 +159,7 @@ pub fn sample_triangles(triangles: &[[Vec3; 3]], cumulative: &[f32], u: f32, v: 
     let [a, b, c] = triangles[i];
     let root = u.sqrt();
     let position = a * (1.0 - root) + b * (root * (1.0 - v)) + c * (root * v);
-    (position, (b - a).cross(c - a).normalize_or(Vec3::Y))
+    (position, quad_normal(b - a, c - a))
 }
 
 #[cfg(test)]

@@ -20,6 +20,12 @@ struct Node {
 
 const IS_LEAF: u32 = 3;
 
+/// Memory of one entry: its place in the tree, and a node for every few of them.
+pub const BYTES_PER_ENTRY: usize = 3 * size_of::<f32>() + size_of::<u32>() + 4 * size_of::<Node>() / LEAF;
+
+/// Memory of one entry while the tree is built, beside that of the tree.
+pub const BYTES_PER_BUILT_ENTRY: usize = size_of::<(Vec3, u32)>();
+
 /// A balanced kd-tree; entries are kept as structure of arrays in leaf order.
 #[derive(Clone, Debug, Default)]
 pub struct KdTree {

@@ -3,8 +3,8 @@
 use crate::math::rgb::Rgb;
 use crate::photons::Photon;
 use crate::photons::footprint::FilterTransform;
-use crate::photons::kd_tree::{KdTree, Nearest, NearestQuery};
-use crate::photons::overlap::OverlapTree;
+use crate::photons::kd_tree::{self, KdTree, Nearest, NearestQuery};
+use crate::photons::overlap::{self, OverlapTree};
 use glam::{DVec2, Vec2, Vec3};
 use rayon::prelude::*;
 
@@ -113,6 +113,16 @@ pub struct Query {
     /// Half-edges of the view parallelogram, metres; zero for a point.
     pub axes: [Vec3; 2],
 }
+
+/// Memory of a stored photon of a map with those structures, bytes.
+pub fn map_bytes(parts: MapParts) -> usize {
+    let structures = [(parts.kd_tree, kd_tree::BYTES_PER_ENTRY), (parts.overlap, overlap::BYTES_PER_ENTRY)];
+    size_of::<MapPhoton>() + structures.iter().filter(|(on, _)| *on).map(|(_, bytes)| bytes).sum::<usize>()
+}
+
+/// Memory of a stored photon while a map is built, beside that of the map, bytes.
+pub const PREPARED_BYTES: usize =
+    size_of::<(MapPhoton, FilterTransform)>() + kd_tree::BYTES_PER_BUILT_ENTRY + overlap::BYTES_PER_BUILT_ENTRY;
 
 impl PhotonMap {
     /// Prepares photons; the same photons give the same map.

@@ -5,9 +5,17 @@ use obvhs::BvhBuildParams;
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::builder::build_bvh2;
+use obvhs::bvh2::node::Bvh2Node;
 use rayon::prelude::*;
 use std::ops::Range;
 use std::time::Duration;
+
+/// Memory of one entry: two nodes and its place in the order.
+pub const BYTES_PER_ENTRY: usize = 2 * size_of::<Bvh2Node>() + size_of::<u32>();
+
+/// Memory of one entry while the hierarchy is built, beside that of the hierarchy: its box, and in the builder a node,
+/// a code along the curve by which boxes are sorted and their indices, twice.
+pub const BYTES_PER_BUILT_ENTRY: usize = size_of::<Aabb>() + size_of::<Bvh2Node>() + 2 * 16;
 
 /// A hierarchy over the boxes of photon footprints. It answers with candidates whose boxes meet the query.
 pub struct OverlapTree {

@@ -75,6 +75,11 @@ impl StoredPhotons {
         }
     }
 
+    /// Gives back the memory that the lists do not use.
+    pub fn shrink(&mut self) {
+        PhotonKind::ALL.into_iter().for_each(|kind| self.of_mut(kind).shrink_to_fit());
+    }
+
     /// Moves all of `other` to the end of these.
     pub fn append(&mut self, other: &mut Self) {
         self.direct.append(&mut other.direct);

@@ -103,6 +103,9 @@ struct Totals {
     open: (f64, f64, f64),
 }
 
+/// Memory for each pixel from the first group on.
+pub(super) const BYTES_PER_PIXEL: usize = size_of::<Pixel>() + size_of::<Block>() / (BLOCK * BLOCK);
+
 /// Where the groups lie along a line: weights and mean of `r`.
 struct Line {
     w: f64,

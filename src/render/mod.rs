@@ -7,6 +7,7 @@ pub mod film;
 pub mod flat_pixels;
 pub mod heatmap;
 pub mod inspect;
+pub mod memory;
 pub mod pass;
 pub mod photon_pass;
 pub mod plan;

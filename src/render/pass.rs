@@ -2,6 +2,7 @@
 
 use crate::estimate::Estimator;
 use crate::render::flat_pixels::FlatPixels;
+use crate::render::memory::foreseen;
 use crate::render::photon_pass::{Emitter, PhotonMaps, PhotonPass};
 use crate::render::plan::{Pilot, Plan, Slot};
 use crate::render::renderer::{area_factor, slots};
@@ -10,6 +11,7 @@ use crate::render::tiles::TILE;
 use crate::render::view::ViewTracer;
 use crate::render::view_pass::ViewPass;
 use crate::scene::Scene;
+use crate::scene::memory::Shortage;
 use crate::trace::Intersector;
 use std::sync::Arc;
 
@@ -40,28 +42,35 @@ pub struct Pass {
 
 impl Pass {
     /// Makes pass `number` (from 0) alone, as a render by these estimators makes it; None if cancelled.
+    ///
+    /// # Errors
+    /// If its photons would need more memory than there is; one line.
     pub fn alone(
         scene: Arc<Scene>,
         settings: RenderSettings,
         estimators: &[Box<dyn Estimator>],
         number: u32,
         cancelled: &(dyn Fn() -> bool + Sync),
-    ) -> Option<Self> {
+    ) -> Result<Option<Self>, Shortage> {
         let slots = slots(estimators, settings.gather);
         Self::for_slots(scene, settings, &slots, number, cancelled)
     }
 
     /// The same, planned for estimators that need not all gather alike.
+    ///
+    /// # Errors
+    /// As [`Pass::alone`].
     pub fn for_slots(
         scene: Arc<Scene>,
         settings: RenderSettings,
         slots: &[Slot],
         number: u32,
         cancelled: &(dyn Fn() -> bool + Sync),
-    ) -> Option<Self> {
+    ) -> Result<Option<Self>, Shortage> {
         let intersector = Arc::new(Intersector::new(&scene.geometry, scene.radius));
         let pilot = Pilot::needed(&scene, &settings).then(|| Pilot::send(&scene, &intersector, &settings));
         let plan = Plan::new(&scene, &settings, slots, pilot.as_ref());
+        foreseen(&scene, &intersector, &settings, &plan, pilot.as_ref(), 1).check(&settings)?;
         let area_factor = area_factor(number);
         let (photons, maps) = (Arc::default(), PhotonMaps::default());
         let flat = needs_flat_pixels(slots.iter().map(|s| s.estimator), &plan, number)
@@ -71,10 +80,10 @@ impl Pass {
             pass.photons = Arc::new(pass.emitter().run(u64::from(number), cancelled));
         }
         if cancelled() {
-            return None;
+            return Ok(None);
         }
         pass.maps = PhotonMaps::new(&pass.scene, &pass.plan, &pass.photons.stored, pass.scale());
-        Some(pass)
+        Ok(Some(pass))
     }
 
     /// What traced its photons.

@@ -57,17 +57,16 @@ impl Emitter<'_> {
             .chunks
             .par_iter()
             .map(|&chunk| {
-                let mut part = PhotonPass::default();
-                if !cancelled() {
-                    let flight = departures.flight(chunk);
-                    for number in departures.numbers(chunk) {
-                        departures.send(&flight, chunk, number, &mut part, &mut Unrecorded);
-                    }
-                }
+                let mut part = if cancelled() { PhotonPass::default() } else { departures.part(chunk) };
+                part.stored.shrink();
                 part
             })
             .collect();
         let mut whole = PhotonPass::default();
+        for kind in PhotonKind::ALL {
+            // Once and exactly: a list that grows by doubling may take twice what it holds.
+            whole.stored.of_mut(kind).reserve_exact(parts.iter().map(|p| p.stored.of(kind).len()).sum());
+        }
         for mut part in parts {
             whole.chunks.push(PhotonKind::ALL.map(|kind| part.stored.of(kind).len() as u32));
             whole.stored.append(&mut part.stored);
@@ -76,6 +75,18 @@ impl Emitter<'_> {
             whole.cut_off += part.cut_off;
         }
         whole
+    }
+
+    /// Traces pass number `pass` and keeps nothing of it: photons emitted, and stored of each kind.
+    pub fn count(&self, pass: u64) -> (u64, [u64; 3]) {
+        let departures = Departures::new(self, pass);
+        let of = |chunk: &Chunk| {
+            let part = departures.part(*chunk);
+            (part.emitted, PhotonKind::ALL.map(|kind| part.stored.of(kind).len() as u64))
+        };
+        let add = |a: (u64, [u64; 3]), b: (u64, [u64; 3])| (a.0 + b.0, std::array::from_fn(|i| a.1[i] + b.1[i]));
+        // Whole numbers: the order of the sum is free.
+        departures.chunks.par_iter().map(of).reduce(Default::default, add)
     }
 
     /// Traces one photon of `photons`, which this emitter made as pass `pass`, once more: the one whose path stored
@@ -173,6 +184,16 @@ impl<'a> Departures<'a> {
 
     fn numbers(&self, chunk: Chunk) -> Range<u64> {
         chunk.first..(chunk.first + CHUNK).min(self.shares[chunk.share].count)
+    }
+
+    /// All photons of a chunk.
+    fn part(&self, chunk: Chunk) -> PhotonPass {
+        let mut part = PhotonPass::default();
+        let flight = self.flight(chunk);
+        for number in self.numbers(chunk) {
+            self.send(&flight, chunk, number, &mut part, &mut Unrecorded);
+        }
+        part
     }
 
     /// Sends one photon off and follows it.

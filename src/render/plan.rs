@@ -12,9 +12,6 @@ use serde::Serialize;
 
 /// Photons that the plan sends ahead to see where light goes.
 pub const PILOT_PHOTONS: u64 = 65_536;
-/// Surfaces that a pilot photon meets at most: where nothing absorbs, a high bounce limit would keep it on its way, and
-/// in memory, for long after it has shown what there is.
-const PILOT_DEPTH: u32 = 64;
 
 /// One part of a render.
 #[derive(Clone, Debug, Serialize)]
@@ -261,7 +258,7 @@ impl Pilot {
     /// Sends [`PILOT_PHOTONS`], which carry no differentials.
     pub fn send(scene: &Scene, intersector: &Intersector, settings: &RenderSettings) -> Self {
         let path = PathSettings {
-            max_depth: settings.max_depth.min(PILOT_DEPTH),
+            max_depth: settings.max_depth,
             direct: false,
             caustic: true,
             global: true,
@@ -270,9 +267,14 @@ impl Pilot {
         };
         let (sampling, seed) = (settings.sampling, settings.seed);
         let emitter = Emitter { scene, intersector, path, sampling, photons: PILOT_PHOTONS, seed };
-        let pass = emitter.run(photon_pass::PILOT_PASS, &|| false);
-        let (caustic, global) = (pass.stored.caustic.len() as u64, pass.stored.global.len() as u64);
-        Self { emitted: pass.emitted, caustic, global }
+        let (emitted, [_, caustic, global]) = emitter.count(photon_pass::PILOT_PASS);
+        Self { emitted, caustic, global }
+    }
+
+    /// Caustic and global photons that were stored for each that was emitted. Where none was, as many as the rule of
+    /// three allows.
+    pub fn stored_per_photon(&self) -> [f64; 2] {
+        [self.caustic, self.global].map(|stored| stored.max(3) as f64 / self.emitted.max(1) as f64)
     }
 
     fn verdict(&self, count: u64, what: &str) -> (bool, String) {

@@ -5,6 +5,7 @@ use crate::render::change::{PhotonStore, World, film_is_kept, photons_are_kept};
 use crate::render::error_estimate::ErrorEstimate;
 use crate::render::film::{Film, Rect};
 use crate::render::flat_pixels::FlatPixels;
+use crate::render::memory::{MemoryNeed, foreseen};
 use crate::render::pass::{Pass, needs_flat_pixels, scale_of};
 use crate::render::photon_pass::{Emitter, PhotonMaps, PhotonPass};
 use crate::render::plan::{Pilot, Plan, Slot};
@@ -14,6 +15,7 @@ use crate::render::tiles::TILE;
 use crate::render::view_pass::{PartSeconds, ViewPass, ViewResult};
 use crate::render::watch::{FilmWatch, Watch};
 use crate::scene::Scene;
+use crate::scene::memory::Shortage;
 use crate::trace::Intersector;
 use std::sync::Arc;
 use std::time::Instant;
@@ -73,6 +75,8 @@ pub struct Renderer {
     inside_glass: u64,
     /// Area of footprints for each pass so far.
     areas: Vec<f64>,
+    /// What a pass was expected to need, when it was asked last.
+    need: Option<MemoryNeed>,
 }
 
 impl Renderer {
@@ -125,6 +129,7 @@ impl Renderer {
             bounded: Bounded::default(),
             inside_glass: 0,
             areas: vec![1.0],
+            need: None,
         }
     }
 
@@ -222,6 +227,31 @@ impl Renderer {
         self.plan = Plan::new(&self.scene, &self.settings, &served, self.pilot.as_ref());
         self.plan_is_stale = false;
         self.seconds.plan = start.elapsed().as_secs_f64();
+    }
+
+    /// What the next pass is expected to need. It makes the plan if there is none yet, and sends the pilot's photons
+    /// where the plan did not ask for them but the most that a pass can store would not fit.
+    pub fn memory(&mut self) -> MemoryNeed {
+        if self.plan_is_stale {
+            self.make_plan(&[]);
+        }
+        let (scene, settings, pilot) = (&self.scene, &self.settings, self.pilot.as_ref());
+        foreseen(scene, &self.intersector, settings, &self.plan, pilot, self.estimators.len())
+    }
+
+    /// What [`Renderer::check_memory`] found; None if it was not asked.
+    pub fn memory_need(&self) -> Option<&MemoryNeed> {
+        self.need.as_ref()
+    }
+
+    /// Makes sure that the next pass can be had; see [`Renderer::memory`].
+    ///
+    /// # Errors
+    /// If it cannot; one line.
+    pub fn check_memory(&mut self) -> Result<(), Shortage> {
+        let need = self.memory();
+        self.need = Some(need);
+        need.check(&self.settings)
     }
 
     /// Makes the next pass of the estimators that have the fewest: photons, maps, and one image for each of them.
@@ -353,9 +383,9 @@ impl Renderer {
     /// Adds up what the estimators `now` cost.
     fn record(&mut self, pass: &Pass, now: &[usize], result: &ViewResult, photon_seconds: f64) {
         self.bounded.views += result.counts.bounded;
-        self.bounded.radiance += result.beyond;
-        self.bounded.disc_floor += result.floored;
         self.inside_glass += result.counts.camera_inside_glass;
+        self.bounded.overflow += result.counts.overflow;
+        self.bounded.disc_floor += result.counts.disc_floor;
         self.seconds.view_trace += result.view_trace;
         for (slot, &i) in now.iter().enumerate() {
             let s = &result.seconds[slot];
@@ -489,6 +519,12 @@ impl Renderer {
         let mut all = self.scene.warnings.clone();
         if self.counted > 0 && self.plan.needs_photons() && self.stored == StoredCounts::default() {
             all.push(format!("none of {} photons was stored", self.emitted));
+        }
+        if self.bounded.overflow > 0 {
+            all.push(format!(
+                "{} pixel values of all passes are beyond 32 bits and were lowered to 3.4e38; lower the power of lights",
+                self.bounded.overflow
+            ));
         }
         if self.inside_glass > 0 {
             all.push(format!("the camera stands inside glass: {} view rays start there", self.inside_glass));

@@ -3,6 +3,7 @@
 use crate::estimate::registry;
 use crate::math::sequence::Sampling;
 use crate::photons::spread::DiffuseSpread;
+use crate::render::memory::check_images;
 use crate::scene::Scene;
 use crate::scene::scene_file::RenderFile;
 use serde::{Deserialize, Serialize};
@@ -179,6 +180,8 @@ impl RenderSettings {
                 ),
             });
         }
+        check_images(&settings, 1)
+            .map_err(|e| SettingError { place: if size.is_some() { "--size".into() } else { e.place }, ..e })?;
         Ok(settings)
     }
 }

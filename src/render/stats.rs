@@ -70,8 +70,8 @@ pub struct Bounded {
     pub footprint_ceiling: u64,
     /// Discs of density estimation raised to the resolution of f32, because their photons lie in one point.
     pub disc_floor: u64,
-    /// Pixels of a pass with a channel beyond f32, which hold its largest number there.
-    pub radiance: u64,
+    /// Pixels of passes with a channel beyond f32, which hold its largest number there; one for each estimator.
+    pub overflow: u64,
     /// Power of the photons whose paths the bounce limit ended, W: the mean over the passes and channels.
     pub cut_off_power: f64,
 }
@@ -96,7 +96,7 @@ impl Bounded {
             (self.footprint_floor, "photon footprints".to_owned(), "raised to the resolution of f32"),
             (self.footprint_ceiling, "photon footprints".to_owned(), "lowered to the scene's radius"),
             (self.disc_floor, "discs of density estimation".to_owned(), "raised to the resolution of f32"),
-            (self.radiance, "pixels".to_owned(), "beyond f32; they hold its largest number"),
+            (self.overflow, "pixels".to_owned(), "beyond f32; they hold its largest number"),
         ];
         let all = paths("photon", &self.photons).into_iter().chain(paths("view", &self.views)).chain(own);
         all.filter(|(count, ..)| *count > 0).collect()
@@ -129,7 +129,7 @@ mod tests {
     fn what_was_bounded_is_said_and_nothing_else() {
         assert!(Bounded::default().lines().is_empty());
         let views = PathCounts { horizon: 3, ..Default::default() };
-        let bounded = Bounded { views, radiance: 2, cut_off_power: 1.5, ..Default::default() };
+        let bounded = Bounded { views, overflow: 2, cut_off_power: 1.5, ..Default::default() };
         let lines = bounded.lines();
         assert_eq!(lines.len(), 3);
         assert!(lines[0].starts_with("bounded: 3 view shading normals beyond the horizon"), "{}", lines[0]);

@@ -52,6 +52,10 @@ pub struct ViewCounts {
     pub bounded: PathCounts,
     /// Camera rays that met the inside of a dielectric first.
     pub camera_inside_glass: u64,
+    /// Pixels with a channel beyond f32, which hold its largest number there; one for each estimator.
+    pub overflow: u64,
+    /// Discs of density estimation that were raised to the resolution of f32.
+    pub disc_floor: u64,
 }
 
 /// What view paths need.

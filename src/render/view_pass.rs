@@ -53,7 +53,7 @@ pub struct TileImage {
     /// Photons looked at, for all hits.
     pub gathered: u64,
     /// Pixels with a channel beyond f32, which hold its largest number there.
-    pub beyond: u64,
+    pub overflow: u64,
     /// Discs of density estimation that were raised to the resolution of f32.
     pub floored: u64,
 }
@@ -98,10 +98,6 @@ pub struct ViewResult {
     pub wall: f64,
     /// Photons looked at by each slot.
     pub gathered: Vec<u64>,
-    /// Pixels of all slots with a channel beyond f32.
-    pub beyond: u64,
-    /// Discs of all slots that were raised to the resolution of f32.
-    pub floored: u64,
     /// Counts of all view paths.
     pub counts: ViewCounts,
     /// Whether all tiles are there.
@@ -195,19 +191,18 @@ impl ViewPass<'_> {
         let scale = if spent > 0.0 { wall / spent } else { 0.0 };
         let mut seconds = vec![PartSeconds::default(); slots.len()];
         let mut gathered = vec![0; slots.len()];
-        let (mut beyond, mut floored) = (0, 0);
         let mut counts = ViewCounts::default();
         for tile in &tiles {
             counts.bounded += tile.counts.bounded;
             counts.camera_inside_glass += tile.counts.camera_inside_glass;
+            counts.overflow += tile.counts.overflow;
+            counts.disc_floor += tile.counts.disc_floor;
             for (i, image) in tile.images.iter().enumerate() {
                 seconds[i].add(&image.seconds, scale);
                 gathered[i] += image.gathered;
-                beyond += image.beyond;
-                floored += image.floored;
             }
         }
-        ViewResult { view_trace: view_trace * scale, tiles, seconds, wall, gathered, beyond, floored, counts, complete }
+        ViewResult { view_trace: view_trace * scale, tiles, seconds, wall, gathered, counts, complete }
     }
 
     /// One tile, whose place among the others is `number`; None if cancelled. Slots take turns at being first, so that none always finds the caches cold.
@@ -238,6 +233,8 @@ impl ViewPass<'_> {
                     }
                     let mut image = self.estimate(&base, n, &slots[i], scratch);
                     image.seconds.view_trace = view_trace;
+                    counts.overflow += image.overflow;
+                    counts.disc_floor += image.floored;
                     images[i] = Some(image);
                 }
             }
@@ -348,16 +345,16 @@ impl ViewPass<'_> {
             seconds.estimate += start.elapsed().as_secs_f64();
         }
         let scale = 1.0 / f64::from(n * n);
-        let mut beyond = 0;
+        let mut overflow = 0;
         let pixels = sums
             .into_iter()
             .map(|s| {
                 let (pixel, bounded) = in_f32(s * scale);
-                beyond += u64::from(bounded);
+                overflow += u64::from(bounded);
                 pixel
             })
             .collect();
-        TileImage { pixels, seconds, gathered, beyond, floored }
+        TileImage { pixels, seconds, gathered, overflow, floored }
     }
 
     /// Traces and gathers for a tile as [`ViewPass::run`] does, and keeps what was found: four bytes for each photon of

@@ -76,7 +76,7 @@ impl Light {
         let mut cumulative_area = Vec::new();
         let mut sum = 0.0f64;
         for t in triangles {
-            let area = f64::from((t[1] - t[0]).cross(t[2] - t[0]).length()) / 2.0;
+            let area = (t[1] - t[0]).as_dvec3().cross((t[2] - t[0]).as_dvec3()).length() / 2.0;
             if area > 0.0 {
                 sum += area;
                 kept.push(t);
@@ -103,8 +103,7 @@ impl Light {
     /// Radiance of the surface of a sphere or quad light, W/(m² sr); zero for lights without area.
     pub fn radiance(&self) -> Rgb {
         match self {
-            Self::Sphere { radius, power, .. } => *power / (4.0 * PI * PI * radius * radius),
-            Self::Quad { u, v, power, .. } => *power / (4.0 * PI * u.cross(*v).length()),
+            Self::Sphere { power, .. } | Self::Quad { power, .. } => *power / (PI * self.area()),
             Self::Mesh { radiance, .. } => *radiance,
             _ => Rgb::ZERO,
         }
@@ -117,6 +116,21 @@ impl Light {
         let c = f64::from(cos_half).max(if falloff > 0.0 { 0.0 } else { -1.0 });
         let edge = if falloff > 0.0 { libm::pow(c, n) } else { c };
         TAU * ((1.0 - edge) / n) as f32
+    }
+
+    /// Whether it is a surface.
+    pub fn has_area(&self) -> bool {
+        matches!(self, Self::Sphere { .. } | Self::Quad { .. } | Self::Mesh { .. })
+    }
+
+    /// Area of its surface, m²; 0 without one.
+    pub fn area(&self) -> f32 {
+        match self {
+            Self::Sphere { radius, .. } => 4.0 * PI * radius * radius,
+            Self::Quad { u, v, .. } => (4.0 * u.as_dvec3().cross(v.as_dvec3()).length()) as f32,
+            Self::Mesh { cumulative_area, .. } => cumulative_area.last().copied().unwrap_or(0.0),
+            _ => 0.0,
+        }
     }
 
     /// The kind's name, as in the scene file.

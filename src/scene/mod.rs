@@ -10,6 +10,7 @@ pub mod light;
 pub mod load;
 pub mod locate;
 pub mod material;
+pub mod memory;
 pub mod obj;
 pub mod scene_file;
 pub mod shapes;

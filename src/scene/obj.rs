@@ -1,6 +1,8 @@
 //! OBJ and MTL through `tobj`: triangulated, in f64, with normals computed where they are missing.
 
+use crate::math::frame::unit;
 use crate::scene::geometry::NONE;
+use crate::scene::load::MAX_LENGTH;
 use crate::scene::scene_file::MaterialFile;
 use crate::scene::shapes::Mesh;
 use glam::{DVec2, DVec3};
@@ -33,21 +35,25 @@ pub const CREASE_ANGLE: f64 = 30.0;
 /// Faces around one vertex beyond which each keeps its own normal: grouping them is quadratic in their number.
 const MAX_FAN: usize = 256;
 
-/// Reads an OBJ from its text; material files are looked for beside `path`.
+/// Reads an OBJ from its text; `path` names it in warnings, and `read` gives the text of a material file by its name,
+/// or None if there is no such file.
 ///
 /// # Errors
 /// A line with a number that is none or not finite, an index out of range, or anything `tobj` refuses.
-pub fn read(path: &Path, text: &str, crease_angle: f64) -> Result<ObjFile, ObjError> {
+pub fn read(
+    path: &Path,
+    text: &str,
+    crease_angle: f64,
+    read: &dyn Fn(&Path) -> Option<String>,
+) -> Result<ObjFile, ObjError> {
     let text = &without_comments(text);
     check_lines(text)?;
     let whole = |what: String| ObjError { line: 0, what };
     let options = tobj::LoadOptions { triangulate: true, ignore_points: true, ignore_lines: true, single_index: false };
-    let folder = path.parent().unwrap_or(Path::new("")).to_owned();
     let bad_material = std::cell::RefCell::new(None);
     let material_text = std::cell::RefCell::new(String::new());
     let (models, materials) = tobj::load_obj_buf(&mut text.as_bytes(), &options, |name| {
-        let read = std::fs::read_to_string(folder.join(name)).map_err(|_| tobj::LoadError::OpenFileFailed)?;
-        let read = without_comments(&read);
+        let read = without_comments(&read(name).ok_or(tobj::LoadError::OpenFileFailed)?);
         material_text.borrow_mut().push_str(&read);
         check_materials(&read).map_err(|line| {
             bad_material.borrow_mut().get_or_insert((name.to_owned(), line));
@@ -79,6 +85,21 @@ pub fn read(path: &Path, text: &str, crease_angle: f64) -> Result<ObjFile, ObjEr
         material_text: material_text.into_inner(),
         warnings,
     })
+}
+
+/// Triangles that the faces of an OBJ make, and its vertices or the corners of smooth faces, the more numerous of the two;
+/// for the memory that they need. It looks at words alone, so it may count more than there are.
+pub fn count(text: &str) -> (u64, u64) {
+    let (mut triangles, mut vertices) = (0u64, 0u64);
+    for line in text.lines() {
+        let mut words = line.split_whitespace();
+        match words.next() {
+            Some("v" | "vn" | "vt") => vertices += 1,
+            Some("f") => triangles += (words.count() as u64).saturating_sub(2),
+            _ => {}
+        }
+    }
+    (triangles, vertices.max(3 * triangles))
 }
 
 /// The text with all from `#` on cut off each line; lines keep their numbers.
@@ -117,15 +138,29 @@ fn check_lines(text: &str) -> Result<(), ObjError> {
         let mut words = line.split_whitespace();
         match words.next() {
             Some(kind @ ("v" | "vn" | "vt")) => {
-                let mut numbers = 0;
+                let mut numbers = Vec::new();
                 for word in words {
                     match word.parse::<f64>() {
-                        Ok(x) if x.is_finite() => numbers += 1,
-                        _ => return wrong(format!("`{kind}` wants finite numbers, got `{word}`")),
+                        Ok(x) if x.abs() <= MAX_LENGTH => numbers.push(x),
+                        _ => {
+                            let most = format!("finite numbers, {MAX_LENGTH:e} at most");
+                            return wrong(format!("`{kind}` wants {most}, got `{word}`"));
+                        }
                     }
                 }
-                if numbers < if kind == "vt" { 1 } else { 3 } {
-                    return wrong(format!("`{kind}` has {numbers} numbers, too few; is the file cut off?"));
+                let count = numbers.len();
+                if count < if kind == "vt" { 1 } else { 3 } {
+                    return wrong(format!("`{kind}` has {count} numbers, too few; is the file cut off?"));
+                }
+                if kind == "v" {
+                    if !matches!(count, 3 | 4 | 6) {
+                        return wrong(format!("`v` has {count} numbers; give 3, or 4 with w, or 6 with a colour"));
+                    }
+                    // The fourth number divides the others.
+                    let w = if count == 4 { numbers[3] } else { 1.0 };
+                    if !numbers[..3].iter().all(|x| (x / w).abs() <= MAX_LENGTH) {
+                        return wrong(format!("divided by w = {w:e}, `v` must be {MAX_LENGTH:e} at most; leave w out"));
+                    }
                 }
                 *counts.entry(kind).or_default() += 1;
             }
@@ -173,7 +208,7 @@ fn append(mesh: &mut Mesh, part: &tobj::Mesh) {
     for at in (0..part.indices.len() / 3 * 3).step_by(3) {
         mesh.triangles.push(corner(&part.indices, p0, at));
         let mut normals = corner(&part.normal_indices, n0, at);
-        if normals.iter().any(|&n| n == NONE || mesh.normals[n as usize].length_squared() == 0.0) {
+        if normals.iter().any(|&n| n == NONE || mesh.normals[n as usize] == DVec3::ZERO) {
             normals = [NONE; 3];
         }
         mesh.corner_normals.push(normals);
@@ -194,7 +229,7 @@ fn add_missing_normals(mesh: &mut Mesh, crease_angle: f64) {
     let mut face = vec![DVec3::ZERO; mesh.triangles.len()];
     for &t in &missing {
         let p = mesh.triangles[t].map(|i| mesh.positions[i as usize]);
-        face[t] = (p[1] - p[0]).cross(p[2] - p[0]).normalize_or_zero();
+        face[t] = unit((p[1] - p[0]).cross(p[2] - p[0])).unwrap_or(DVec3::ZERO);
         for c in 0..3 {
             let (a, b) = (p[(c + 1) % 3] - p[c], p[(c + 2) % 3] - p[c]);
             let cos = (a.dot(b) / (a.length() * b.length())).clamp(-1.0, 1.0);
@@ -216,7 +251,7 @@ fn add_missing_normals(mesh: &mut Mesh, crease_angle: f64) {
                 .filter(|(other, _)| face[*other as usize].dot(own) >= cos_crease)
                 .map(|(other, angle)| face[*other as usize] * *angle)
                 .sum();
-            *normal = sum.try_normalize().unwrap_or(own);
+            *normal = unit(sum).unwrap_or(own);
         }
         if corners.iter().any(|n| n.dot(own) < 1.0 - 1e-12) {
             let base = mesh.normals.len() as u32;
@@ -256,7 +291,7 @@ mod tests {
     use super::*;
 
     fn read_text(text: &str) -> Result<ObjFile, ObjError> {
-        read(Path::new("t.obj"), text, CREASE_ANGLE)
+        read(Path::new("t.obj"), text, CREASE_ANGLE, &|_| None)
     }
 
     #[test]
@@ -279,13 +314,12 @@ mod tests {
 
     #[test]
     fn broken_material_files_are_named() {
-        let folder = tempfile::tempdir().expect("a folder");
         let obj = "mtllib m.mtl\nv 0 0 0 # origin\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
         for (mtl, line) in
             [("newmtl q\nKd 0.5 0.5\n", 2), ("newmtl q\nKe 1 1", 2), ("newmtl\n", 1), ("newmtl q\nNi nan\n", 2)]
         {
-            std::fs::write(folder.path().join("m.mtl"), mtl).expect("writes");
-            let error = read(&folder.path().join("t.obj"), obj, CREASE_ANGLE).err().expect(mtl);
+            let files = |name: &Path| (name == Path::new("m.mtl")).then(|| mtl.to_owned());
+            let error = read(Path::new("t.obj"), obj, CREASE_ANGLE, &files).err().expect(mtl);
             assert!(error.what.starts_with(&format!("m.mtl:{line}: ")), "{}", error.what);
         }
     }
@@ -296,6 +330,10 @@ mod tests {
             ("v 0 0 0\nv 1 nan 0\n", 2),
             ("v 0 0 0\nv 1 0 0\nv 0 1 0\n\nf 1 2 4\n", 5),
             ("v 0 0\n", 1),
+            ("v 1 1 1 0\n", 1),
+            ("v 0 0 0 1\nv 1 1 1 5e-324\n", 2),
+            ("v 0 0 0 1 1\n", 1),
+            ("v 0 0 1e16\n", 1),
             ("v 0 0 0\nf 1 1\n", 2),
             ("v 0 0 0\nf a b c\n", 2),
         ] {

@@ -3,59 +3,85 @@
 use crate::math::hash::{FNV_START, fnv1a};
 use crate::scene::built_in::{self, BuiltIn};
 use crate::scene::load;
+use crate::scene::memory;
 use crate::scene::scene_file::SceneFile;
 use crate::scene::{Scene, SceneError};
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// The files that a scene may name: those beside it, or those of the binary.
+/// The files that a scene may name: those beside it, those of the binary, or those that a caller holds in memory.
 pub enum Files {
     /// Relative to a folder.
     Folder(PathBuf),
     /// Those that a built-in scene carries.
     BuiltIn(&'static [(&'static str, &'static str)]),
+    /// By name; nothing is read from a disk.
+    Memory(BTreeMap<String, Vec<u8>>),
 }
 
 impl Files {
     /// Text of the file `name`, and the path by which errors call it.
     ///
     /// # Errors
-    /// If it is not there, or is no text.
+    /// If it is not there, is no plain file, or is no text.
     pub fn read(&self, name: &str) -> Result<(PathBuf, String), SceneError> {
+        let (file, bytes) = self.bytes(name)?;
+        match String::from_utf8(bytes) {
+            Ok(text) => Ok((file, text)),
+            Err(_) => Err(SceneError::Unreadable { file, why: NOT_TEXT.into() }),
+        }
+    }
+
+    /// Bytes of the file `name`, and the path by which errors call it.
+    ///
+    /// # Errors
+    /// If it is not there, or is no plain file.
+    pub fn bytes(&self, name: &str) -> Result<(PathBuf, Vec<u8>), SceneError> {
+        let missing = |why: &str| SceneError::Unreadable { file: name.into(), why: why.into() };
         match self {
             Self::Folder(folder) => {
                 let path = folder.join(name);
-                read_text(&path).map(|text| (path, text))
+                read_bytes(&path).map(|bytes| (path, bytes))
             }
             Self::BuiltIn(files) => files
                 .iter()
                 .find(|(n, _)| *n == name)
-                .map(|(n, text)| (PathBuf::from(n), (*text).to_owned()))
-                .ok_or_else(|| SceneError::Unreadable {
-                    file: name.into(),
-                    why: "not among the built-in files".into(),
-                }),
-        }
-    }
-
-    /// Path of the file `name`, if it is one on disk.
-    pub fn path(&self, name: &str) -> Option<PathBuf> {
-        match self {
-            Self::Folder(folder) => Some(folder.join(name)),
-            Self::BuiltIn(_) => None,
+                .map(|(n, text)| (PathBuf::from(n), text.as_bytes().to_vec()))
+                .ok_or_else(|| missing("not among the built-in files")),
+            Self::Memory(files) => {
+                files.get(name).map(|bytes| (PathBuf::from(name), bytes.clone())).ok_or_else(|| missing("no such file"))
+            }
         }
     }
 }
 
-fn read_text(path: &Path) -> Result<String, SceneError> {
-    std::fs::read_to_string(path).map_err(|e| SceneError::Unreadable {
-        file: path.to_owned(),
-        why: match e.kind() {
+const NOT_TEXT: &str = "not text in UTF-8";
+
+/// Bytes of a plain file: a device or a pipe may never end.
+fn read_bytes(path: &Path) -> Result<Vec<u8>, SceneError> {
+    let wrong = |why: String| SceneError::Unreadable { file: path.to_owned(), why };
+    let read = || {
+        let about = std::fs::metadata(path)?;
+        if !about.is_file() {
+            return Ok(Err(wrong("no plain file".into())));
+        }
+        match memory::check(format!("its {} bytes", about.len()), about.len(), "give a smaller file") {
+            Ok(()) => std::fs::read(path).map(Ok),
+            Err(short) => Ok(Err(wrong(short.to_string()))),
+        }
+    };
+    read().unwrap_or_else(|e: std::io::Error| {
+        Err(wrong(match e.kind() {
             std::io::ErrorKind::NotFound => "no such file".into(),
-            std::io::ErrorKind::InvalidData => "not text in UTF-8".into(),
             _ => e.to_string(),
-        },
+        }))
     })
+}
+
+fn read_text(path: &Path) -> Result<String, SceneError> {
+    String::from_utf8(read_bytes(path)?)
+        .map_err(|_| SceneError::Unreadable { file: path.to_owned(), why: NOT_TEXT.into() })
 }
 
 /// An opened scene: as it is written, which can be edited, and as it was loaded.
@@ -92,7 +118,7 @@ impl Source {
             "toml" => from_toml(path.to_owned(), read_text(path)?, folder()),
             "obj" => {
                 let text = read_text(path)?;
-                let (file, scene) = load::scene_from_obj(path, &text)?;
+                let (file, scene) = load::scene_from_obj(path, &text, &folder())?;
                 let (path, text, scene) = (path.to_owned(), String::new(), Arc::new(scene));
                 Ok(Self { name: name.to_owned(), file, scene, path, text, files: folder() })
             }

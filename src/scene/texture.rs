@@ -2,8 +2,10 @@
 
 use crate::math::elementary::pow;
 use crate::math::rgb::Rgb;
+use crate::scene::memory;
 use glam::Vec2;
-use std::path::Path;
+use image::{ImageFormat, ImageReader};
+use std::io::Cursor;
 
 /// An image of linear reflectances, repeated over the plane.
 #[derive(Clone, Debug, PartialEq)]
@@ -13,12 +15,22 @@ pub struct Texture {
 }
 
 impl Texture {
-    /// Reads a PNG; its values are taken as sRGB and made linear.
+    /// Decodes a PNG; its values are taken as sRGB and made linear.
     ///
     /// # Errors
-    /// The reason, if the file cannot be read or decoded.
-    pub fn load(path: &Path) -> Result<Self, String> {
-        let image = image::open(path).map_err(|e| e.to_string())?.to_rgb8();
+    /// The reason, if the bytes are no PNG or the picture is too large.
+    pub fn decode(png: &[u8]) -> Result<Self, String> {
+        let one_line = |e: image::ImageError| e.to_string().split_whitespace().collect::<Vec<_>>().join(" ");
+        let reader = || ImageReader::with_format(Cursor::new(png), ImageFormat::Png);
+        let (width, height) = reader().into_dimensions().map_err(one_line)?;
+        let pixels = u64::from(width) * u64::from(height);
+        // Up to 16 bits in four channels as they are decoded, beside eight bits in three and the texels.
+        let needed = memory::bytes(pixels, 8 + 3 + size_of::<Rgb>());
+        memory::check(format!("a picture of {width}x{height} pixels"), needed, "make it smaller")
+            .map_err(|e| e.to_string())?;
+        let mut reader = reader();
+        reader.no_limits();
+        let image = reader.decode().map_err(one_line)?.to_rgb8();
         let table: Vec<f32> = (0..256).map(|i| srgb_to_linear(i as f32 / 255.0)).collect();
         Ok(Self {
             size: [image.width(), image.height()],

@@ -4,6 +4,7 @@ use super::history::History;
 use super::worker::messages::Job;
 use crate::export::session::Session;
 use crate::render::RenderSettings;
+use crate::render::memory::check_images;
 use crate::scene::scene_file::SceneFile;
 use crate::scene::{Scene, Source};
 use std::path::{Path, PathBuf};
@@ -61,6 +62,7 @@ fn settings(scene: &Scene, session: &Session) -> Result<RenderSettings, String> 
     let mut settings =
         RenderSettings::new(scene, &session.render, session.size, session.seed).map_err(|e| e.to_string())?;
     settings.plan = session.plan;
+    check_images(&settings, estimators(session).len()).map_err(|e| e.to_string())?;
     Ok(settings)
 }
 
@@ -145,6 +147,7 @@ impl Document {
             change = Change::Render;
         }
         if estimators(now) != estimators(before) || now.stop_rule() != before.stop_rule() {
+            check_images(&self.settings, estimators(now).len()).map_err(|e| e.to_string())?;
             change = Change::Render;
         }
         Ok(change)

@@ -41,7 +41,7 @@ impl Workbench {
         let path = path.to_owned();
         self.desk.asked_images.insert(path.clone());
         self.analysis.ask(Kind::Image(path.clone()), move || {
-            let read = crate::measure::Reference::from_files(path.as_ref(), None).map(|r| r.image);
+            let read = crate::measure::image_file::read(path.as_ref()).map_err(|e| e.to_string());
             Finding::Image(path, read)
         });
     }

@@ -138,6 +138,10 @@ impl Render {
                     self.finished = true;
                     self.stopped_by = Some(why);
                 }
+                Event::Refused { why, .. } => {
+                    messages.error(why);
+                    self.finished = true;
+                }
                 Event::Failed { why } => {
                     messages.error(format!("{why}; start another with Render > Restart the render thread"));
                     failed = true;

@@ -6,6 +6,7 @@
 mod acts;
 mod painter;
 mod pictures;
+mod refusals;
 mod renderer;
 mod threads;
 mod truth;

@@ -134,7 +134,7 @@ impl TestCase {
             Slot { estimator: &integrated, gather: Gather::Overlap },
         ];
         let start = Instant::now();
-        let pass = Pass::for_slots(Arc::new(scene), settings, &slots, 0, &interrupted).ok_or_else(|| stopped(item))?;
+        let pass = Pass::for_slots(Arc::new(scene), settings, &slots, 0, &interrupted)?.ok_or_else(|| stopped(item))?;
         let photon_seconds = start.elapsed().as_secs_f64();
         Ok(Self { pass, photon_seconds, item, hidden: common.quiet || common.json })
     }

@@ -17,6 +17,7 @@ use crate::measure::study::study_plan::{Shard, Task};
 use crate::measure::study::{Keep, StudyPlan, Sweep, TaskRecord, Unfinished, task};
 use crate::render::Watch;
 use crate::render::film::Image;
+use crate::render::memory::check_images;
 use crate::render::settings::RenderSettings;
 use crate::scene::scene_file::RenderFile;
 use crate::scene::{Scene, open};
@@ -143,6 +144,7 @@ fn prepare(args: &StudyArgs) -> Result<Prepared, Failure> {
         && let Given::Reference(r) = &reference
     {
         base.size = r.image.size;
+        check_images(&base, 1)?;
     }
     reference.check(&args.judge, base.size)?;
     let settings =

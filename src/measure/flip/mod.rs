@@ -9,6 +9,7 @@ mod filter;
 
 use crate::measure::Mask;
 use crate::render::film::Image;
+use crate::scene::memory;
 use color::{ColorSpaces, hyab};
 use filter::{Plane, contrast_sensitivity, features};
 use glam::DVec3;
@@ -20,6 +21,10 @@ pub const PIXELS_PER_DEGREE: f64 = 3840.0 * std::f64::consts::PI / 180.0;
 pub const MAX_STOPS: f32 = 64.0;
 
 /// Exponent of the colour difference.
+/// Memory for each pixel at the highest: for both images three planes and the colours seen, two planes of features, and
+/// for one image the colours before they are planes, and three filtered planes.
+const BYTES_PER_PIXEL: usize = 2 * (3 * 4 + size_of::<DVec3>() + 2 * 4) + size_of::<DVec3>() + 3 * 4;
+
 const COLOR_EXPONENT: f64 = 0.7;
 /// Exponent of the feature difference.
 const FEATURE_EXPONENT: f64 = 0.5;
@@ -86,6 +91,10 @@ pub fn flip(image: &Image, reference: &Image, view: FlipView) -> Result<Flip, St
     if image.size != reference.size {
         return Err(format!("sizes differ: image {:?}, reference {:?}", image.size, reference.size));
     }
+    let pixels = u64::from(image.size[0]) * u64::from(image.size[1]);
+    let asked = format!("FLIP of {}x{} pixels", image.size[0], image.size[1]);
+    memory::check(asked, memory::bytes(pixels, BYTES_PER_PIXEL), "compare smaller images")
+        .map_err(|e| e.to_string())?;
     let spaces = ColorSpaces::new();
     let color = |plane_of: &[Plane; 3]| seen(&spaces, plane_of, view.pixels_per_degree);
     let (a, b) = (opponent_planes(&spaces, image, view.exposure), opponent_planes(&spaces, reference, view.exposure));

@@ -92,6 +92,7 @@ pub fn save(folder: &Path, tracer: &Tracer) -> Result<(), String> {
     std::fs::create_dir_all(folder).map_err(|e| wrong(&e))?;
     let mut file = tempfile::Builder::new().prefix(".cusp-").tempfile_in(folder).map_err(|e| wrong(&e))?;
     file.write_all(&encode(tracer.batches(), tracer.seconds(), key)).map_err(|e| wrong(&e))?;
+    file.as_file().sync_all().map_err(|e| wrong(&e))?;
     file.persist(&path).map_err(|e| wrong(&e.error))?;
     Ok(())
 }

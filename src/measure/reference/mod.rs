@@ -6,7 +6,7 @@ pub mod noise;
 
 pub use noise::Noise;
 
-use crate::measure::image_file;
+use crate::measure::image_file::{self, Marked};
 use crate::measure::metrics::{self, ErrorMetrics, Mask};
 use crate::render::film::Image;
 use crate::scene::built_in;
@@ -55,7 +55,8 @@ impl Reference {
         }))
     }
 
-    /// A reference from files, EXR or PNG (see [`image_file::read`]); without a mask all pixels count.
+    /// A reference from files, EXR or PNG (see [`image_file::read`]); without a mask all pixels count, but those that are
+    /// not finite, which the source tells of.
     ///
     /// Source and noise are those that the header of an EXR states (see [`Self::facts`]); without them the source is
     /// the file and the noise is unknown.
@@ -63,8 +64,9 @@ impl Reference {
     /// # Errors
     /// A file that cannot be read, or a mask of another size.
     pub fn from_files(reference: &Path, mask: Option<&Path>) -> Result<Self, String> {
-        let (image, facts) = image_file::read_with_facts(reference).map_err(|e| e.to_string())?;
-        let mask = match mask {
+        let Marked { image, facts, not_finite: odd } =
+            image_file::read_reference(reference).map_err(|e| e.to_string())?;
+        let mut mask = match mask {
             Some(path) => image_file::read_mask(path).map_err(|e| e.to_string())?,
             None => Mask::all(image.size),
         };
@@ -73,6 +75,9 @@ impl Reference {
                 "the mask has {}x{} pixels, the reference {}x{}; they must be the same",
                 mask.size[0], mask.size[1], image.size[0], image.size[1]
             ));
+        }
+        if let Some(odd) = &odd {
+            mask.leave_out(&odd.pixels);
         }
         let fact = |key: &str| facts.iter().find(|(k, _)| k == key).map(|(_, v)| v.as_str());
         let number = |key: &str| {
@@ -87,6 +92,10 @@ impl Reference {
         let source = match fact(SOURCE) {
             Some(source) => format!("{} ({source})", reference.display()),
             None => reference.display().to_string(),
+        };
+        let source = match odd {
+            Some(odd) => format!("{source}, {odd}, left out"),
+            None => source,
         };
         Ok(Self { source, image, mask, noise })
     }

@@ -12,7 +12,7 @@ use crate::photons::map::{FootprintLimits, MapParts, Query};
 use crate::photons::{Photon, PhotonMap};
 use crate::render::film::Rect;
 use crate::render::plan::Slot;
-use crate::render::settings::{DirectLight, Gather, LightPart};
+use crate::render::settings::{DirectLight, Gather, LightPart, PlanMode};
 use crate::scene::{Light, Material, Scene, source};
 use glam::Vec3;
 use rayon::prelude::*;
@@ -459,6 +459,8 @@ fn white_box() -> Outcome {
             let photons = if depth == 1000 { 20 } else { 2_000 };
             let r = rendered(&scene, [8, 8], "density,integrated", 1, |s| {
                 (s.photons, s.max_depth, s.direct) = (photons, depth, DirectLight::Photons);
+                // A pilot follows many more photons.
+                s.plan = PlanMode::Full;
             })?;
             finite_films(&r, out);
             let Some(pass) = r.last_pass() else { return Err("no pass".into()) };
@@ -501,8 +503,8 @@ fn beyond_f32() -> Outcome {
             finite_films(&r, out);
             let pixels = r.films()[0].image().pixels;
             let beyond = pixels.iter().filter(|p| p.max_element() == f32::MAX).count() as f64;
-            let counted = r.bounded().radiance as f64;
-            out.bounded += r.bounded().radiance;
+            let counted = r.bounded().overflow as f64;
+            out.bounded += r.bounded().overflow;
             out.expect(counted > 0.0, || "none is beyond".into());
             out.see((beyond - counted).abs() / pixels.len() as f64, || {
                 format!("{direct:?}: {beyond} beyond, {counted} counted")

@@ -6,9 +6,12 @@ use crate::measure::study::Setting;
 use crate::render::settings::RenderSettings;
 use crate::scene::Scene;
 use crate::scene::scene_file::RenderFile;
+use std::collections::HashSet;
 
 /// Most settings that a study may have.
 pub const MAX_SETTINGS: usize = 10_000;
+/// Largest number of combinations of values, of which many may be the same setting.
+const MAX_COMBINATIONS: usize = 1_000_000;
 
 /// Values of each swept setting; one that is empty is not swept.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -64,7 +67,13 @@ impl Sweep {
         flags: &RenderFile,
         estimators: &[Box<dyn Estimator>],
     ) -> Result<Vec<Setting>, String> {
+        let lists = [self.photons.len(), self.k.len(), self.n.len(), self.footprint_scale.len(), self.gather.len()];
+        let combinations = lists.iter().fold(estimators.len(), |all, n| all.saturating_mul((*n).max(1)));
+        if combinations > MAX_COMBINATIONS {
+            return Err(format!("--sweep: {combinations} combinations, {MAX_COMBINATIONS} at most; sweep less"));
+        }
         let mut all: Vec<Setting> = Vec::new();
+        let mut seen = HashSet::new();
         for e in estimators {
             for n in each(&self.n) {
                 let varied = match n {
@@ -83,7 +92,7 @@ impl Sweep {
                                 file.gather = gather.clone().or(file.gather);
                                 let settings = RenderSettings::new(scene, &file, None, 1).map_err(|e| e.to_string())?;
                                 let setting = Setting::of(&settings, e);
-                                if !all.contains(&setting) {
+                                if seen.insert(format!("{} {}", setting.estimator, setting.rest())) {
                                     all.push(setting);
                                 }
                                 if all.len() > MAX_SETTINGS {
@@ -113,7 +122,7 @@ fn fill<T>(into: &mut Vec<T>, text: &str, values: &[&str], parse: impl Fn(&str) 
 pub fn whole_number(text: &str) -> Option<i64> {
     text.parse().ok().or_else(|| {
         let x: f64 = text.parse().ok()?;
-        (x.fract() == 0.0 && x.abs() < 1e15).then_some(x as i64)
+        (x.fract() == 0.0 && x.abs() < i64::MAX as f64).then_some(x as i64)
     })
 }
 

@@ -84,6 +84,7 @@ pub fn run<K: Keep>(
     let chosen = estimator(&setting.estimator).map_err(|e| e.to_string())?;
     let start = Instant::now();
     let mut renderer = Renderer::new(Arc::clone(scene), settings, vec![chosen]);
+    renderer.check_memory().map_err(|e| e.to_string())?;
     let mut spent = start.elapsed().as_secs_f64();
     let mut so_far = Unfinished { points: Vec::new(), sums: Vec::new() };
     if let Some(old) = keep.unfinished()

@@ -180,7 +180,7 @@ fn a_pass_alone_is_that_of_a_render() {
     for number in [0, 2] {
         let rendered = pass("cornell", &by("overlap"), ALL, number);
         let (scene, settings) = (Arc::clone(&rendered.scene), rendered.settings.clone());
-        let alone = Pass::alone(scene, settings, &list, number, &|| false).expect("not cancelled");
+        let alone = Pass::alone(scene, settings, &list, number, &|| false).expect("fits").expect("not cancelled");
         assert_eq!(images(&rendered, &list), images(&alone, &list));
         assert_eq!(alone.area_factor.to_bits(), rendered.area_factor.to_bits());
     }

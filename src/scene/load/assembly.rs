@@ -1,5 +1,6 @@
 //! All surfaces and lights in f64 as they come from a file, and their move to the local origin.
 
+use crate::math::frame::unit;
 use crate::math::rgb::Rgb;
 use crate::scene::Camera;
 use crate::scene::Material;
@@ -19,8 +20,9 @@ pub(super) struct CameraSource {
 impl CameraSource {
     /// The camera about a local origin.
     pub(super) fn local(&self, origin: DVec3) -> Camera {
-        let forward = (self.target - self.position).normalize();
-        let right = forward.cross(self.up).normalize();
+        // Both have a direction: the loader has looked.
+        let forward = unit(self.target - self.position).unwrap_or(DVec3::NEG_Z);
+        let right = unit(forward.cross(self.up)).unwrap_or(DVec3::X);
         Camera {
             position: (self.position - origin).as_vec3(),
             frame: [right, right.cross(forward), forward].map(|v| v.as_vec3()),
@@ -73,7 +75,8 @@ pub(super) struct Assembly {
     pub(super) materials: Vec<Material>,
     pub(super) material_names: Vec<String>,
     pub(super) spheres: Vec<(DVec3, f64, u32)>,
-    pub(super) lights: Vec<LightSource>,
+    /// Each with the key that it came from.
+    pub(super) lights: Vec<(String, LightSource)>,
 }
 
 impl Assembly {
@@ -114,22 +117,26 @@ impl Assembly {
     }
 }
 
-/// Moves the assembly to the local origin, in f32, without its zero-area triangles.
+/// Length relative to the scene's radius below which products of edges vanish against the scene in f32.
+const SMALLEST: f64 = 1e-12;
+
+/// Moves the assembly to the local origin, in f32, without its triangles and spheres that have no area.
 pub(super) fn local_geometry(assembly: &Assembly, origin: DVec3, radius: f64) -> Geometry {
     let mesh = &assembly.mesh;
     let mut g = Geometry {
         positions: mesh.positions.iter().map(|&p| (p - origin).as_vec3()).collect(),
-        normals: mesh.normals.iter().map(|n| n.try_normalize().unwrap_or(DVec3::Y).as_vec3()).collect(),
+        normals: mesh.normals.iter().map(|n| unit(*n).unwrap_or(DVec3::Y).as_vec3()).collect(),
         uvs: mesh.uvs.iter().map(|t| t.as_vec2()).collect(),
         spheres: assembly
             .spheres
             .iter()
+            .filter(|(_, r, _)| *r > radius * SMALLEST)
             .map(|&(c, r, material)| Sphere { center: (c - origin).as_vec3(), radius: r as f32, material })
             .collect(),
         ..Default::default()
     };
-    // Products of edges shorter than this vanish against the scene in f32.
-    let smallest = radius * radius * 1e-24;
+    g.zero_area = assembly.spheres.len() - g.spheres.len();
+    let smallest = radius * radius * (SMALLEST * SMALLEST);
     for (i, t) in mesh.triangles.iter().enumerate() {
         let [a, b, c] = t.map(|i| mesh.positions[i as usize]);
         if (b - a).cross(c - a).length() <= smallest {

@@ -87,12 +87,12 @@ impl Loader<'_> {
             }
         };
         if let LightSource::Quad { u, v, .. } = &light
-            && u.cross(*v).length_squared() == 0.0
+            && u.cross(*v) == DVec3::ZERO
         {
             return self.wrong(at("v"), "the quad has no area; u and v must not be parallel");
         }
         self.light_surface(&light);
-        self.assembly.lights.push(light);
+        self.assembly.lights.push((key.to_owned(), light));
         Ok(())
     }
 

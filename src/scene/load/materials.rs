@@ -76,12 +76,12 @@ impl Loader<'_> {
     }
 
     pub(super) fn texture(&mut self, key: &str, name: &str) -> Checked<Texture> {
-        let Some(path) = self.files.path(name) else {
-            return self.wrong(key, "a built-in scene has no textures");
+        let (path, bytes) = match self.files.bytes(name) {
+            Ok(found) => found,
+            Err(e) => return self.wrong(key, format!("{e}; give a PNG")),
         };
-        // Its bytes belong to the scene's hash; that they cannot be read is reported below.
-        let bytes = std::fs::read(&path).unwrap_or_default();
+        // Its bytes belong to the scene's hash.
         self.texts.push(format!("{:016x}", fnv1a(FNV_START, &bytes)));
-        Texture::load(&path).or_else(|why| self.wrong(key, format!("{}: {why}; give a PNG", path.display())))
+        Texture::decode(&bytes).or_else(|why| self.wrong(key, format!("{}: {why}; give a PNG", path.display())))
     }
 }

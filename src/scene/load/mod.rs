@@ -5,8 +5,12 @@ mod lights;
 mod materials;
 mod surfaces;
 
+use crate::math::frame::unit;
 use crate::math::rgb::Rgb;
+use crate::scene::geometry::BYTES_PER_TRIANGLE as TRIANGLE_BYTES;
+use crate::scene::geometry::BYTES_PER_VERTEX as VERTEX_BYTES;
 use crate::scene::locate::Locator;
+use crate::scene::memory;
 use crate::scene::scene_file::{AnimateFile, CameraFile, LightFile, RenderFile, SceneFile, ShapeFile};
 use crate::scene::source::{Files, hash_of};
 use crate::scene::{Camera, Light, Scene, SceneError};
@@ -19,10 +23,20 @@ use std::path::Path;
 pub const MAX_RESOLUTION: i64 = 32_768;
 /// Largest number of pixels of an image.
 pub const MAX_PIXELS: u64 = 1 << 26;
-/// Largest coordinate, length or factor that a file may hold.
-const MAX_LENGTH: f64 = 1e15;
-/// Largest power, radiance or irradiance.
+/// Largest coordinate, length or factor that a file may hold, and largest coordinate of a placed shape.
+pub const MAX_LENGTH: f64 = 1e15;
+/// Largest power, radiance or irradiance that a file may hold.
 const MAX_POWER: f64 = 1e30;
+/// Largest flux or radiance that follows from those: sums and products with numbers near 1 stay within 32 bits.
+const MAX_FLUX: f32 = 1e36;
+/// Least flux but 0: the power of one of 2³¹ photons of it still has all its digits in 32 bits.
+const MIN_FLUX: f32 = 1e-20;
+/// Radius of a scene, metres. Fourth powers of lengths down to its resolution and up to it stay within 32 bits.
+const RADIUS: std::ops::RangeInclusive<f64> = 1e-9..=1e12;
+/// Least vertical field of view, degrees: below it all pixels have one direction in 32 bits.
+const MIN_FOV: f64 = 1e-3;
+/// Largest vertical field of view, degrees.
+const MAX_FOV: f64 = 179.99;
 
 type Checked<T> = Result<T, SceneError>;
 
@@ -49,6 +63,7 @@ pub fn parse(file: &Path, text: &str) -> Checked<SceneFile> {
 pub fn scene_from_file(file: &Path, text: &str, parsed: &SceneFile, files: &Files) -> Checked<Scene> {
     let mut loader = Loader::new(Locator::new(file, text), files);
     loader.texts.push(text.to_owned());
+    loader.foresee(&parsed.shapes, &parsed.lights)?;
     loader.materials(&parsed.materials)?;
     for (i, shape) in parsed.shapes.iter().enumerate() {
         loader.shape(&format!("shapes[{i}]"), shape)?;
@@ -77,15 +92,13 @@ pub fn camera_from_file(file: &Path, text: &str, parsed: &SceneFile, files: &Fil
 }
 
 /// An OBJ as a scene of its own: a camera that frames it and a point light above the camera's shoulder. Returns the
-/// scene file that says so, and the scene.
+/// scene file that says so, and the scene. `files` holds it and what it names.
 ///
 /// # Errors
 /// Anything wrong in the file.
-pub fn scene_from_obj(file: &Path, text: &str) -> Checked<(SceneFile, Scene)> {
+pub fn scene_from_obj(file: &Path, text: &str, files: &Files) -> Checked<(SceneFile, Scene)> {
     let name = file.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
-    let folder = file.parent().unwrap_or(Path::new("")).to_owned();
-    let files = Files::Folder(folder);
-    let mut loader = Loader::new(Locator::new(file, ""), &files);
+    let mut loader = Loader::new(Locator::new(file, ""), files);
     loader.texts.push(text.to_owned());
     let shape = ShapeFile { kind: "mesh".into(), file: Some(name), ..Default::default() };
     loader.shape("mesh", &shape)?;
@@ -127,6 +140,12 @@ struct Loader<'a> {
     assembly: Assembly,
     material_index: BTreeMap<String, u32>,
     warnings: Vec<String>,
+    /// Memory that could be had before the first large shape, bytes.
+    memory: Option<u64>,
+    /// Triangles of all shapes so far, those of the next one included.
+    triangles: u64,
+    /// Their vertices and normals, the more numerous of the two.
+    vertices: u64,
 }
 
 impl<'a> Loader<'a> {
@@ -138,7 +157,30 @@ impl<'a> Loader<'a> {
             assembly: Assembly::default(),
             material_index: BTreeMap::new(),
             warnings: Vec::new(),
+            memory: None,
+            triangles: 0,
+            vertices: 0,
         }
+    }
+
+    /// Counts a shape's triangles among all and makes sure that these can be had.
+    fn reserve(&mut self, key: &str, triangles: u64, vertices: u64, advice: &str) -> Checked<()> {
+        self.triangles = self.triangles.saturating_add(triangles);
+        self.vertices = self.vertices.saturating_add(vertices);
+        if self.triangles.max(self.vertices) >= u64::from(u32::MAX) {
+            let what = format!(
+                "makes {} triangles of {} vertices in all; an index of 32 bits can tell 4294967294 apart; {advice}",
+                self.triangles, self.vertices
+            );
+            return self.wrong(key, what);
+        }
+        let needed = memory::bytes(self.triangles, TRIANGLE_BYTES) + memory::bytes(self.vertices, VERTEX_BYTES);
+        if needed <= memory::ALWAYS {
+            return Ok(());
+        }
+        let available = *self.memory.get_or_insert_with(memory::available);
+        memory::check_against(available, format!("{} triangles in all", self.triangles), needed, advice)
+            .or_else(|short| self.wrong(key, short.to_string()))
     }
 
     fn wrong<T>(&self, key: impl Into<String>, what: impl Into<String>) -> Checked<T> {
@@ -169,12 +211,12 @@ impl<'a> Loader<'a> {
         if value.iter().all(|x| x.abs() <= MAX_LENGTH) {
             Ok(DVec3::from_array(value))
         } else {
-            self.wrong(key, format!("must be three finite numbers, got {value:?}"))
+            self.wrong(key, format!("must be three finite numbers, {MAX_LENGTH:e} at most, got {value:?}"))
         }
     }
 
     fn direction(&self, key: &str, value: [f64; 3]) -> Checked<DVec3> {
-        match self.vector(key, value)?.try_normalize() {
+        match unit(self.vector(key, value)?) {
             Some(d) => Ok(d),
             None => self.wrong(key, "has no length; give a direction"),
         }
@@ -184,7 +226,7 @@ impl<'a> Loader<'a> {
         if value > 0.0 && value <= MAX_LENGTH {
             Ok(value)
         } else {
-            self.wrong(key, format!("must be positive and finite ({unit}), got {value}"))
+            self.wrong(key, format!("must be positive and finite ({unit}), {MAX_LENGTH:e} at most, got {value}"))
         }
     }
 
@@ -195,7 +237,7 @@ impl<'a> Loader<'a> {
         if c.iter().all(|&x| (0.0..=MAX_POWER).contains(&x)) {
             Ok(DVec3::from_array(c).as_vec3())
         } else {
-            self.wrong(key, format!("must be finite and not negative ({unit}), got {c:?}"))
+            self.wrong(key, format!("must be finite and not negative ({unit}), {MAX_POWER:e} at most, got {c:?}"))
         }
     }
 
@@ -212,13 +254,13 @@ impl<'a> Loader<'a> {
         let position = self.vector("camera.position", c.position)?;
         let target = self.vector("camera.target", c.target)?;
         let up = self.direction("camera.up", c.up.unwrap_or([0.0, 1.0, 0.0]))?;
-        if !(c.fov_y > 0.0 && c.fov_y < 180.0) {
-            return self.wrong("camera.fov_y", format!("must lie in (0, 180) degrees, got {}", c.fov_y));
+        if !(MIN_FOV..=MAX_FOV).contains(&c.fov_y) {
+            let what = format!("must lie in [{MIN_FOV}, {MAX_FOV}] degrees, got {}", c.fov_y);
+            return self.wrong("camera.fov_y", what);
         }
-        let forward = (target - position).normalize_or_zero();
-        if forward == DVec3::ZERO {
+        let Some(forward) = unit(target - position) else {
             return self.wrong("camera.target", "is where the camera stands; move one of them");
-        }
+        };
         if forward.cross(up).length() < 1e-9 {
             return self.wrong("camera.up", "is parallel to the view; turn it");
         }
@@ -234,8 +276,44 @@ impl<'a> Loader<'a> {
         Ok(CameraSource { position, target, up, fov_y: c.fov_y, resolution: resolution.map(|r| r as u32) })
     }
 
+    /// Whether a light's flux and radiance are numbers of 32 bits that can be worked with.
+    fn check_light(&self, key: &str, light: &Light) -> Checked<()> {
+        let (flux, radiance) = (light.flux(), light.radiance());
+        for (value, what, unit) in [(flux, "flux", "W"), (radiance, "radiance", "W/(m² sr)")] {
+            if !value.is_finite() || value.max_element() > MAX_FLUX {
+                let larger = if what == "flux" { "smaller" } else { "larger" };
+                return self.wrong(
+                    key,
+                    format!(
+                        "its {what} must be at most {MAX_FLUX:e} {unit}, it is {:e}; lower its power or make it {larger}",
+                        value.max_element()
+                    ),
+                );
+            }
+        }
+        if flux.max_element() > 0.0 && flux.max_element() < MIN_FLUX {
+            let what = format!(
+                "its flux must be 0 or at least {MIN_FLUX:e} W, it is {:e}; raise its power or leave it out",
+                flux.max_element()
+            );
+            return self.wrong(key, what);
+        }
+        if light.has_area() && flux == Rgb::ZERO && light.area() == 0.0 {
+            return self.wrong(key, "has no area in 32 bits; make it larger");
+        }
+        Ok(())
+    }
+
     fn finish(mut self, name: String, camera: &CameraSource, render: RenderFile) -> Checked<Scene> {
         let (origin, radius) = self.assembly.bounds();
+        if !RADIUS.contains(&radius) {
+            let what = format!(
+                "the scene's radius must lie in {:e} to {:e} metres, it is {radius:e}; scale the shapes",
+                RADIUS.start(),
+                RADIUS.end()
+            );
+            return self.wrong("shapes", what);
+        }
         let local = |p: DVec3| (p - origin).as_vec3();
         let geometry = local_geometry(&self.assembly, origin, radius);
         if geometry.primitive_count() == 0 {
@@ -245,9 +323,9 @@ impl<'a> Loader<'a> {
             self.warnings.push("the scene has no light".into());
         }
         if geometry.zero_area > 0 {
-            self.warnings.push(format!("{} triangles without area left out", geometry.zero_area));
+            self.warnings.push(format!("{} triangles or spheres without area left out", geometry.zero_area));
         }
-        let lights = self.assembly.lights.iter().map(|l| match l {
+        let lights = self.assembly.lights.iter().map(|(_, l)| match l {
             LightSource::Point { position, power } => Light::Point { position: local(*position), power: *power },
             LightSource::Sphere { center, radius, power } => {
                 Light::Sphere { center: local(*center), radius: *radius as f32, power: *power }
@@ -275,6 +353,10 @@ impl<'a> Loader<'a> {
                 *radiance,
             ),
         });
+        let lights: Vec<Light> = lights.collect();
+        for ((key, _), light) in self.assembly.lights.iter().zip(&lights) {
+            self.check_light(key, light)?;
+        }
         let texts: Vec<&str> = self.texts.iter().map(String::as_str).collect();
         Ok(Scene {
             name,
@@ -282,7 +364,7 @@ impl<'a> Loader<'a> {
             origin,
             radius: radius as f32,
             camera: camera.local(origin),
-            lights: lights.collect(),
+            lights,
             geometry: geometry.into(),
             materials: self.assembly.materials,
             material_names: self.assembly.material_names,

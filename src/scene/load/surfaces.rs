@@ -5,12 +5,39 @@ use super::{Checked, Loader, MAX_LENGTH};
 use crate::math::rgb::Rgb;
 use crate::scene::geometry::NONE;
 use crate::scene::obj::{self, CREASE_ANGLE};
-use crate::scene::scene_file::{RotateFile, ShapeFile};
+use crate::scene::scene_file::{LightFile, RotateFile, ShapeFile};
 use crate::scene::shapes::{self, Placement};
 use crate::scene::{Material, SceneError};
 use glam::{DMat3, DVec3};
 
+/// Facets around a ring, if none are given.
+const SEGMENTS: i64 = 256;
+/// Most of them.
+const MAX_SEGMENTS: i64 = 1_000_000;
+
 impl Loader<'_> {
+    /// Makes sure that the triangles of all shapes whose number the file tells can be had, before any is made. Meshes
+    /// are counted when they are read.
+    pub(super) fn foresee(&mut self, shapes: &[ShapeFile], lights: &[LightFile]) -> Checked<()> {
+        for (i, s) in shapes.iter().enumerate() {
+            let key = format!("shapes[{i}]");
+            match s.kind.as_str() {
+                "quad" => self.reserve(&key, 2, 4, "leave shapes out")?,
+                "box" => self.reserve(&key, 12, 24, "leave shapes out")?,
+                "ring" => {
+                    // Numbers out of range are refused in their turn.
+                    let n = s.segments.unwrap_or(SEGMENTS).clamp(0, MAX_SEGMENTS) as u64;
+                    self.reserve(&format!("{key}.segments"), 6 * n, 4 * n, "lower segments, or leave shapes out")?;
+                }
+                _ => {}
+            }
+        }
+        for (i, _) in lights.iter().enumerate().filter(|(_, l)| l.kind == "quad") {
+            self.reserve(&format!("lights[{i}]"), 2, 4, "leave lights out")?;
+        }
+        Ok(())
+    }
+
     pub(super) fn placement(&self, key: &str, shape: &ShapeFile) -> Checked<Placement> {
         let scale = match shape.scale {
             Some(s) => self.positive(&format!("{key}.scale"), s, "a factor")?,
@@ -96,10 +123,12 @@ impl Loader<'_> {
                 let center = place.point(center);
                 // A sphere's material was found above; only a mesh may go without.
                 let material = material.unwrap_or(NONE);
+                self.within(key, &[center - radius, center + radius])?;
                 self.assembly.spheres.push((center, radius, material));
                 if let Some(radiance) = self.emission(material) {
                     let flux = radiance.as_dvec3() * (4.0 * std::f64::consts::PI.powi(2) * radius * radius);
-                    self.assembly.lights.push(LightSource::Sphere { center, radius, power: flux.as_vec3() });
+                    let light = LightSource::Sphere { center, radius, power: flux.as_vec3() };
+                    self.assembly.lights.push((at("material"), light));
                 }
                 return Ok(());
             }
@@ -135,9 +164,9 @@ impl Loader<'_> {
                 if !(outer > inner && outer <= MAX_LENGTH) {
                     return self.wrong(at("outer"), format!("must exceed `inner` ({inner}), got {outer}"));
                 }
-                let segments = s.segments.unwrap_or(256);
-                if !(3..=1_000_000).contains(&segments) {
-                    return self.wrong(at("segments"), format!("must lie in 3 to 1000000, got {segments}"));
+                let segments = s.segments.unwrap_or(SEGMENTS);
+                if !(3..=MAX_SEGMENTS).contains(&segments) {
+                    return self.wrong(at("segments"), format!("must lie in 3 to {MAX_SEGMENTS}, got {segments}"));
                 }
                 shapes::ring(inner, outer, height, segments as u32)
             }
@@ -145,10 +174,12 @@ impl Loader<'_> {
         };
         // Only a mesh may lack a material, and it has been dealt with.
         let material = material.unwrap_or(NONE);
-        self.assembly.add_mesh(mesh.placed(&place), |_| material);
+        let mesh = mesh.placed(&place);
+        self.within(key, &mesh.positions)?;
+        self.assembly.add_mesh(mesh, |_| material);
         match emitted {
-            Some(light) => self.assembly.lights.push(light),
-            None => self.emit_from(first, material),
+            Some(light) => self.assembly.lights.push((at("material"), light)),
+            None => self.emit_from(&at("material"), first, material),
         }
         Ok(())
     }
@@ -163,12 +194,18 @@ impl Loader<'_> {
         }
         let (path, text) = match self.files.read(name) {
             Ok(found) => found,
-            Err(SceneError::Unreadable { file, why }) if !key.eq("mesh") => {
+            Err(SceneError::Unreadable { file, why }) if key != "mesh" => {
                 return self.wrong(format!("{key}.file"), format!("{}: {why}", file.display()));
             }
             Err(e) => return Err(e),
         };
-        let obj = obj::read(&path, &text, crease).map_err(|e| match e.line {
+        // Material files and textures are named relative to the mesh.
+        let folder = std::path::Path::new(name).parent().map(|p| p.to_path_buf()).unwrap_or_default();
+        let material_file =
+            |mtl: &std::path::Path| self.files.read(&folder.join(mtl).to_string_lossy()).ok().map(|(_, text)| text);
+        let (triangles, vertices) = obj::count(&text);
+        self.reserve(&format!("{key}.file"), triangles, vertices, "give a smaller mesh, or leave shapes out")?;
+        let obj = obj::read(&path, &text, crease, &material_file).map_err(|e| match e.line {
             0 => SceneError::Whole { file: path.clone(), what: e.what },
             line => SceneError::At { file: path.clone(), line, key: "OBJ".into(), what: e.what },
         })?;
@@ -177,14 +214,13 @@ impl Loader<'_> {
         self.texts.push(obj.material_text);
         let first = self.assembly.mesh.triangles.len();
         let mesh = obj.mesh.placed(place);
+        self.within(key, &mesh.positions)?;
         if let Some(material) = material {
             self.assembly.add_mesh(mesh, |_| material);
-            self.emit_from(first, material);
+            self.emit_from(&format!("{key}.material"), first, material);
             return Ok(());
         }
         let mut own = Vec::new();
-        // Textures are named relative to the mesh, like its material file.
-        let folder = std::path::Path::new(name).parent().map(|p| p.to_path_buf()).unwrap_or_default();
         for (material, mut file) in obj.materials {
             file.texture = file.texture.map(|t| folder.join(t).to_string_lossy().into_owned());
             let made = self.material(&format!("material {material}"), &file).map_err(|e| match e {
@@ -208,11 +244,21 @@ impl Loader<'_> {
             let material = self.assembly.mesh.materials[start];
             let run = self.assembly.mesh.materials[start..].iter().take_while(|&&m| m == material).count();
             if let Some(radiance) = self.emission(material) {
-                self.assembly.lights.push(LightSource::Mesh { first: start, count: run, radiance });
+                let light = LightSource::Mesh { first: start, count: run, radiance };
+                self.assembly.lights.push((format!("{key}.file"), light));
             }
             start += run;
         }
         Ok(())
+    }
+
+    /// Whether a placed shape lies where coordinates can be worked with.
+    fn within(&self, key: &str, points: &[DVec3]) -> Checked<()> {
+        let reach = points.iter().fold(0.0, |m: f64, p| m.max(p.abs().max_element()));
+        if reach <= MAX_LENGTH {
+            return Ok(());
+        }
+        self.wrong(key, format!("reaches {reach:e} m from the origin, {MAX_LENGTH:e} m at most; scale or move it"))
     }
 
     pub(super) fn emission(&self, material: u32) -> Option<Rgb> {
@@ -223,10 +269,10 @@ impl Loader<'_> {
     }
 
     /// Makes all triangles from `first` on a light, if their material emits.
-    pub(super) fn emit_from(&mut self, first: usize, material: u32) {
+    pub(super) fn emit_from(&mut self, key: &str, first: usize, material: u32) {
         if let Some(radiance) = self.emission(material) {
             let count = self.assembly.mesh.triangles.len() - first;
-            self.assembly.lights.push(LightSource::Mesh { first, count, radiance });
+            self.assembly.lights.push((key.to_owned(), LightSource::Mesh { first, count, radiance }));
         }
     }
 }

@@ -74,6 +74,13 @@ pub enum Event {
         /// Why.
         why: StoppedBy,
     },
+    /// The next pass would need more memory than there is; the worker rests, and what it has stays.
+    Refused {
+        /// Generation of the job.
+        generation: u64,
+        /// One line.
+        why: String,
+    },
     /// The worker's thread has ended by a defect; the window may start another.
     Failed {
         /// One line.
@@ -122,6 +129,7 @@ impl Event {
             | Self::TileDone { generation, .. }
             | Self::DraftDone { generation }
             | Self::PassDone { generation, .. }
+            | Self::Refused { generation, .. }
             | Self::Finished { generation, .. } => Some(*generation),
             Self::Failed { .. } => None,
         }

@@ -110,7 +110,15 @@ impl Loop<'_> {
             }
             desk.send(Event::DraftDone { generation: job.generation });
         }
+        // Films whose images are kept need no pass, and so no memory.
+        let asks_for_more = |now: &Standing| job.stop.verdict(now).is_none();
         let mut now = Standing { passes: renderer.passes(), seconds: renderer.seconds().sum(), next_pass: 0.0, error };
+        if asks_for_more(&now)
+            && !renderer.films().is_empty()
+            && let Err(short) = renderer.check_memory()
+        {
+            return desk.send(Event::Refused { generation: job.generation, why: short.to_string() });
+        }
         // Without an estimator there is nothing to wait for.
         let nothing = renderer.films().is_empty().then_some(StoppedBy::Passes);
         let why = loop {
