@@ -6,7 +6,7 @@ use crate::math::rgb::{Rgb, mean};
 use crate::math::sequence::Sequence;
 use crate::scene::{Light, Scene};
 use crate::trace::Differential;
-use crate::trace::surface::SELF_INTERSECTION;
+use crate::trace::surface::{SELF_INTERSECTION, flat_normal};
 use glam::Vec3;
 use std::f32::consts::{PI, TAU};
 
@@ -96,7 +96,7 @@ pub fn emit(scene: &Scene, light: &Light, count: u64, x: [f32; 4]) -> Emission {
         }
         Light::Quad { center, u, v, .. } => {
             let position = *center + *u * (2.0 * x[0] - 1.0) + *v * (2.0 * x[1] - 1.0);
-            from_surface(position, u.cross(*v).normalize())
+            from_surface(position, quad_normal(*u, *v))
         }
         Light::Mesh { triangles, cumulative_area, .. } => {
             let (position, normal) = sample_triangles(triangles, cumulative_area, x[0], x[1]);
@@ -142,6 +142,11 @@ fn spot_cosine(cos_half: f32, falloff: f32, whole: f32, u: f32) -> (f32, f32) {
     (cos, (pow(cos, falloff) / whole).max(f32::MIN_POSITIVE / f32::EPSILON))
 }
 
+/// Unit normal of a parallelogram with half-edges `u`, `v`, whose product may be too small for f32.
+pub fn quad_normal(u: Vec3, v: Vec3) -> Vec3 {
+    flat_normal([Vec3::ZERO, u, v]).as_vec3()
+}
+
 /// Uniform point on triangles: position and unit normal of the front side.
 pub fn sample_triangles(triangles: &[[Vec3; 3]], cumulative: &[f32], u: f32, v: f32) -> (Vec3, Vec3) {
     let Some(total) = cumulative.last() else {
@@ -154,7 +159,7 @@ pub fn sample_triangles(triangles: &[[Vec3; 3]], cumulative: &[f32], u: f32, v: 
     let [a, b, c] = triangles[i];
     let root = u.sqrt();
     let position = a * (1.0 - root) + b * (root * (1.0 - v)) + c * (root * v);
-    (position, (b - a).cross(c - a).normalize_or(Vec3::Y))
+    (position, flat_normal([a, b, c]).as_vec3())
 }
 
 #[cfg(test)]

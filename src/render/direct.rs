@@ -4,7 +4,7 @@ use crate::math::elementary::pow;
 use crate::math::frame::tangents;
 use crate::math::rgb::Rgb;
 use crate::math::sequence::Sequence;
-use crate::photons::emission::sample_triangles;
+use crate::photons::emission::{quad_normal, sample_triangles};
 use crate::scene::{Light, Scene};
 use crate::trace::surface::SELF_INTERSECTION;
 use crate::trace::{Intersector, Ray};
@@ -99,10 +99,10 @@ fn sample(light: &Light, r: &Receiver, scene_radius: f32, u: f32, v: f32) -> Opt
                 .then(|| LightSample { offset: -*direction * (4.0 * scene_radius), irradiance: *irradiance * cos })
         }
         Light::Sphere { center, radius, power } => sphere(r, *center, *radius, *power, u, v),
-        Light::Quad { center, u: eu, v: ev, .. } => {
+        Light::Quad { center, u: eu, v: ev, power } => {
             let position = *center + *eu * (2.0 * u - 1.0) + *ev * (2.0 * v - 1.0);
-            let n = eu.cross(*ev);
-            from_surface(r, position, n.normalize(), light.radiance() * (4.0 * n.length()))
+            // L A = Φ/π, whatever the area.
+            from_surface(r, position, quad_normal(*eu, *ev), *power / PI)
         }
         Light::Mesh { triangles, cumulative_area, radiance } => {
             let (position, n) = sample_triangles(triangles, cumulative_area, u, v);

@@ -237,10 +237,11 @@ impl ViewTracer<'_> {
         let bend = weights.eta * weights.eta;
         let mut follow = |next: SpecularRay, weight: Rgb, medium: Option<u32>| {
             counts.bounded.horizon += u64::from(next.beyond_horizon);
+            counts.bounded.normals += u64::from(next.without_shading);
             let throughput = branch.throughput * weight;
             if throughput != Rgb::ZERO {
                 stack.push(Branch {
-                    ray: Ray { origin: surface.leave(self.scene, next.direction), direction: next.direction },
+                    ray: Ray { origin: next.origin, direction: next.direction },
                     differential: next.differential,
                     throughput,
                     medium,

@@ -76,7 +76,8 @@ impl Light {
         let mut cumulative_area = Vec::new();
         let mut sum = 0.0f64;
         for t in triangles {
-            let area = f64::from((t[1] - t[0]).cross(t[2] - t[0]).length()) / 2.0;
+            let [a, b, c] = t.map(|p| p.as_dvec3());
+            let area = (b - a).cross(c - a).length() / 2.0;
             if area > 0.0 {
                 sum += area;
                 kept.push(t);

@@ -29,8 +29,9 @@ pub enum Material {
     Dielectric {
         /// Refractive index against the outside, at least 1.
         ior: f32,
-        /// Transmittance per metre inside, per channel.
-        transmittance: Rgb,
+        /// Absorption coefficient inside, -ln of the transmittance per metre, per channel, 1/m. Not the transmittance
+        /// itself, whose digits vanish in f32 beside 1 or 0 where the scene's unit is far from a metre.
+        absorption: Rgb,
     },
     /// A light's surface: black to light that arrives, radiant on its front side.
     Emitter {
@@ -48,6 +49,17 @@ impl Material {
     /// Whether it scatters light in all directions.
     pub fn is_diffuse(&self) -> bool {
         matches!(self, Self::Diffuse { .. })
+    }
+
+    /// Transmittance of a way of `distance` metres inside, per channel, in `[0, 1]`; 1 for other kinds.
+    pub fn transmittance(&self, distance: f32) -> Rgb {
+        match self {
+            Self::Dielectric { absorption, .. } => {
+                let over = |a: f32| libm::exp(-f64::from(a) * f64::from(distance)) as f32;
+                Rgb::new(over(absorption.x), over(absorption.y), over(absorption.z))
+            }
+            _ => Rgb::ONE,
+        }
     }
 
     /// Diffuse reflectance at the texture coordinates `uv`; black for other kinds.

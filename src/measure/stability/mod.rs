@@ -4,12 +4,17 @@
 
 pub mod case;
 mod oracle;
+mod scenes;
 
+mod chains;
 mod clipping;
+mod differentials;
+mod units;
+mod watertight;
 
 pub use case::{Case, Judged, Outcome, Verdict};
 
 /// All cases of this module, group by group.
 pub fn cases() -> Vec<Case> {
-    [clipping::CASES].concat()
+    [clipping::CASES, differentials::CASES, watertight::CASES, units::CASES, chains::CASES].concat()
 }
