@@ -95,6 +95,16 @@ mod tests {
         assert!((out.dv[0].length() - 0.1).abs() < 1e-6 && out.dv[0].dot(out.dv[1]).abs() < 1e-8);
     }
 
+    /// A mirrored footprint stays mirrored whatever its size.
+    #[test]
+    fn small_footprints_keep_their_sense() {
+        for size in [1.0f32, 1e-12, 1e-24, 1e24] {
+            let d = Differential { dp: [Vec3::X * size, Vec3::Z * size], dv: [Vec3::ZERO; 2] };
+            let (out, _) = bounce(DiffuseSpread::Polar, &d, Vec3::NEG_Y, Vec3::Y, 1.0, 100);
+            assert!((out.dv[0] - Vec3::X * 0.1).length() < 1e-7 && (out.dv[1] - Vec3::Z * 0.1).length() < 1e-7);
+        }
+    }
+
     #[test]
     fn turning_takes_one_direction_to_the_other() {
         let v = Vec3::new(0.36, -0.48, 0.8);

@@ -1,6 +1,5 @@
 //! Direct light by shadow rays.
 
-use crate::math::elementary::pow;
 use crate::math::frame::tangents;
 use crate::math::rgb::Rgb;
 use crate::math::sequence::Sequence;
@@ -81,15 +80,17 @@ fn sample(light: &Light, r: &Receiver, scene_radius: f32, u: f32, v: f32) -> Opt
     match light {
         Light::Point { position, power } => towards(r, *position, |_| *power / (4.0 * PI)),
         Light::Spot { position, direction, cos_half, falloff, power } => {
-            let axial = *power / Light::spot_normalization(*cos_half, *falloff);
-            towards(r, *position, |w| {
-                let cos = -w.dot(*direction);
+            let axial = *power / Light::spot_normalization(*cos_half, *falloff) as f32;
+            towards(r, *position, |_| {
+                // f64 from the places on: a narrow cone's edge, and a high power of the cosine, are near 1.
+                let w = (r.position.as_dvec3() - position.as_dvec3()).normalize();
+                let cos = w.dot(direction.as_dvec3().normalize());
                 if cos < *cos_half || (*falloff > 0.0 && cos <= 0.0) {
                     Rgb::ZERO
                 } else if *falloff == 0.0 {
                     axial
                 } else {
-                    axial * pow(cos, *falloff)
+                    axial * libm::pow(cos, f64::from(*falloff)) as f32
                 }
             })
         }
@@ -209,7 +210,7 @@ mod tests {
         let half = 0.5f32;
         let axis = -offset.normalize();
         let spot =
-            |falloff| lit_by(Light::Spot { position, direction: axis, cos_half: half.cos(), falloff, power }, at, 1);
+            |falloff| lit_by(Light::Spot { position, direction: axis, cos_half: f64::from(half).cos(), falloff, power }, at, 1);
         let omega = TAU * (1.0 - half.cos());
         assert!((spot(0.0) / (30.0 / omega * cos / (d * d)) - 1.0).abs() < 1e-4);
         let lobe = TAU * (1.0 - half.cos().powi(5)) / 5.0;

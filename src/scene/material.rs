@@ -73,3 +73,20 @@ impl Material {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Tinted glass in millimetres, kilometres and beyond lets the same through from side to side.
+    #[test]
+    fn tint_does_not_know_the_unit() {
+        for unit in [1e-9f64, 1e-3, 1.0, 1e3, 1e9] {
+            let absorption = Rgb::splat((-libm::log(0.75) * unit) as f32);
+            let through = Material::Dielectric { ior: 1.5, absorption }.transmittance((2.0 / unit) as f32);
+            assert!((through.x - 0.5625).abs() < 1e-6, "{unit}: {through}");
+        }
+        let black = Material::Dielectric { ior: 1.5, absorption: Rgb::splat(f32::MAX) };
+        assert_eq!((black.transmittance(0.0), black.transmittance(1e-3)), (Rgb::ONE, Rgb::ZERO));
+    }
+}

@@ -258,6 +258,24 @@ mod tests {
         }
     }
 
+    /// In the plane of the surface and at the critical angle a column is endless: the longest allowed, and it says so.
+    #[test]
+    fn what_would_be_infinite_is_the_longest_allowed() {
+        let d = Differential { dp: [Vec3::Y, Vec3::ZERO], dv: [Vec3::Y, Vec3::ZERO] };
+        let mut along = d.transfer(Vec3::X, Vec3::Y, 1.0);
+        assert!(along.dp[0].is_finite() && along.bound(2.0, 10.0));
+        assert!((along.dp[0].abs() - Vec3::X * 2.0).length() < 1e-6 && along.dp[1] == Vec3::ZERO);
+        let (sin, cos) = libm::sincos(libm::asin(1.0 / 1.5));
+        let critical = Vec3::new(sin as f32, -cos as f32, 0.0);
+        let mut through = d.refract(critical, Vec3::Y, [Vec3::ZERO; 2], 1.5);
+        assert!(through.bound(2.0, 10.0));
+        assert!((through.dv[0].length() - 10.0).abs() < 1e-5 && through.dv[0].normalize().y.abs() > 0.99);
+        let endless = Vec3::new(1.0, f32::NEG_INFINITY, 0.0);
+        let mut endless = Differential { dp: [endless, Vec3::ZERO], ..Default::default() };
+        assert!(endless.bound(2.0, 10.0));
+        assert_eq!(endless.dp[0], Vec3::NEG_Y * 2.0);
+    }
+
     #[test]
     fn bound_reports_what_it_changes() {
         let mut d = Differential { dp: [Vec3::X * 3.0, Vec3::Y], dv: [Vec3::ZERO, Vec3::splat(f32::NAN)] };

@@ -277,6 +277,72 @@ mod tests {
         }
     }
 
+    /// A component of -0 is none: without care it turns the box test over, and the ray meets nothing.
+    #[test]
+    fn a_zero_has_no_sign() {
+        let g = soup(200, 20);
+        let intersector = Intersector::new(&g, 1.0);
+        let sequence = Sequence::new(Sampling::Random, 7);
+        let mut hits = 0;
+        for i in 0..3000 {
+            let x = sequence.four(i, 0);
+            let mut d = crate::math::frame::uniform_sphere(x[3], x[0]).normalize();
+            d[i as usize % 3] = 0.0;
+            d[(i / 3) as usize % 3] = 0.0;
+            let origin = Vec3::new(x[1], x[2], x[0]);
+            let with = |zero: f32| d.map(|c| if c == 0.0 { zero } else { c });
+            let [a, b] = [0.0, -0.0].map(|zero| Ray { origin, direction: with(zero) });
+            let found = |r| intersector.closest(r).map(|h| (h.t, h.primitive));
+            assert_eq!(found(&a), found(&b));
+            assert_eq!(intersector.any(&a, 0.5), intersector.any(&b, 0.5));
+            hits += u32::from(found(&a).is_some());
+        }
+        assert!(hits > 300, "{hits}");
+    }
+
+    /// From thousands of radii away rays meet what those meet that start nearer on the same line.
+    #[test]
+    fn far_starts_lose_nothing() {
+        let g = soup(400, 60);
+        let intersector = Intersector::new(&g, 1.0);
+        let sequence = Sequence::new(Sampling::Random, 8);
+        for i in 0..3000 {
+            let (x, y) = (sequence.four(i, 0), sequence.four(i, 1));
+            let direction = crate::math::frame::uniform_sphere(x[0], x[1]).normalize();
+            let away = libm::exp2f(13.0 * x[2]);
+            let origin = Vec3::new(y[0], y[1], y[2]) - direction * away;
+            let ray = Ray { origin, direction };
+            let sheared = ShearedRay::new(origin, direction);
+            let brute = (0..400).filter_map(|k| sheared.intersect(&g.corners(k), f32::INFINITY).map(|h| h.0));
+            let spheres = g.spheres.iter().filter_map(|s| sphere(&ray, s.center, s.radius, f32::INFINITY));
+            let brute = brute.chain(spheres).fold(f32::INFINITY, f32::min);
+            assert_eq!(intersector.closest(&ray).map_or(f32::INFINITY, |h| h.t), brute, "{ray:?}");
+            assert_eq!(intersector.any(&ray, away), brute < away);
+        }
+    }
+
+    #[test]
+    fn of_two_surfaces_in_one_place_the_first_is_met() {
+        let mut g = soup(300, 0);
+        let base = g.positions.len() as u32;
+        g.positions.extend([Vec3::ZERO, Vec3::X, Vec3::Y].map(|p| p * 2.0 - Vec3::Z * 0.5));
+        for copy in 0..40 {
+            let at = g.triangles.len() - copy * 7;
+            g.triangles.insert(at, [base, base + 1, base + 2]);
+        }
+        let first = g.triangles.iter().position(|t| t[0] == base).expect("there") as u32;
+        for v in [&mut g.corner_normals, &mut g.corner_uvs] {
+            v.resize(340, [NONE; 3]);
+        }
+        g.triangle_materials.resize(340, 0);
+        let intersector = Intersector::new(&g, 1.0);
+        for i in 0..100 {
+            let origin = Vec3::new(0.1 + 0.005 * i as f32, 0.3, -1.0);
+            let hit = intersector.closest(&Ray { origin, direction: Vec3::Z }).expect("the wall");
+            assert_eq!(hit.primitive, first);
+        }
+    }
+
     #[test]
     fn a_ray_that_is_not_finite_meets_nothing() {
         let intersector = Intersector::new(&soup(10, 0), 1.0);

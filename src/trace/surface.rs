@@ -174,6 +174,33 @@ mod tests {
     use crate::scene::source::open_built_in;
     use crate::trace::Intersector;
 
+    #[test]
+    fn normals_of_needles_and_specks_are_theirs() {
+        // A speck whose area vanishes in f32, and a needle whose edges are parallel but for their last digits.
+        let tiny = [Vec3::ZERO, Vec3::X * 1e-25, Vec3::Y * 1e-24];
+        assert_eq!(flat_normal(tiny), DVec3::Z);
+        let needle = [Vec3::ZERO, Vec3::new(1.0, 0.3, 0.7), Vec3::new(1.0, 0.3, 0.700_000_05)];
+        let expected = DVec3::new(f64::from(0.3f32), -1.0, 0.0).normalize();
+        assert!((flat_normal(needle) - expected).length() < 1e-7);
+        assert_eq!(flat_normal([Vec3::ONE; 3]), DVec3::Y);
+    }
+
+    /// A sphere of a thousandth of the way to it: the normal is that of the place where the line of the ray meets it.
+    #[test]
+    fn a_far_small_sphere_keeps_its_normals() {
+        let (center, radius) = (DVec3::new(30.0, -20.0, 90.0), 0.01);
+        for i in 0..50 {
+            let off = DVec3::new(0.003, -0.004, 0.0) * (f64::from(i) / 30.0);
+            let ray = Ray { origin: Vec3::ZERO, direction: (center + off).normalize().as_vec3() };
+            let d = ray.direction.as_dvec3().normalize();
+            let b = d.dot(center);
+            let half = (radius * radius - (center - d * b).length_squared()).sqrt();
+            let expected = (d * (b - half) - center) / radius;
+            let found = sphere_normal(&ray, center, radius, f64::from((b - half) as f32));
+            assert!((found - expected).length() < 1e-6, "{i}");
+        }
+    }
+
     /// dN on the ring's smooth wall and on a sphere against finite differences of the traced normal.
     #[test]
     fn normal_differential_matches_traced_neighbours() {

@@ -96,6 +96,22 @@ mod tests {
         assert!(hits > 500);
     }
 
+    /// On a needle across all axes the place that the weights name is the one that the distance names.
+    #[test]
+    fn a_hit_does_not_slide_along_a_needle() {
+        let along = Vec3::new(1.0, 0.9, -0.8);
+        for width in [1e-2f32, 1e-4, 1e-6] {
+            let corners = [-along, along, Vec3::new(-0.5, 0.6, 0.1) * width];
+            for i in 0..50 {
+                let target = (corners[0] + (corners[1] - corners[0]) * (0.02 * i as f32)).lerp(corners[2], 0.3);
+                let o = Vec3::new(0.3, -0.4, 2.0);
+                let Some((t, b, c)) = ShearedRay::new(o, target - o).intersect(&corners, f32::INFINITY) else { continue };
+                let place = corners[0] * (1.0 - b - c) + corners[1] * b + corners[2] * c;
+                assert!((o + (target - o) * t - place).length() < 1e-6, "{width} {i}: {}", place - target);
+            }
+        }
+    }
+
     /// Rays from inside a closed octahedron aimed exactly at its vertices and edges never leave it.
     #[test]
     fn no_ray_leaks_through_edges_or_vertices() {
