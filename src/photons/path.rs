@@ -279,7 +279,9 @@ pub fn medium_behind(surface: &Surface) -> Option<u32> {
 /// Transmittance of a way of `distance` metres in `medium`, if that absorbs.
 pub fn attenuation(scene: &Scene, medium: Option<u32>, distance: f32) -> Option<Rgb> {
     match scene.materials.get(medium? as usize) {
-        Some(m @ Material::Dielectric { absorption, .. }) if *absorption != Rgb::ZERO => Some(m.transmittance(distance)),
+        Some(m @ Material::Dielectric { absorption, .. }) if *absorption != Rgb::ZERO => {
+            Some(m.transmittance(distance))
+        }
         _ => None,
     }
 }

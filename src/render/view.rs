@@ -163,7 +163,7 @@ impl ViewTracer<'_> {
                 Material::Diffuse { .. } => {
                     let weight = branch.throughput * material.diffuse_reflectance(surface.uv) * FRAC_1_PI;
                     if self.plan.shadow_rays {
-                        let receiver = Receiver { position: surface.position, normal: surface.normal };
+                        let receiver = Receiver { position: surface.position, normal: surface.normal, found_along: v };
                         light = weight
                             * direct::irradiance(
                                 self.scene,

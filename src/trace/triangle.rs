@@ -105,7 +105,9 @@ mod tests {
             for i in 0..50 {
                 let target = (corners[0] + (corners[1] - corners[0]) * (0.02 * i as f32)).lerp(corners[2], 0.3);
                 let o = Vec3::new(0.3, -0.4, 2.0);
-                let Some((t, b, c)) = ShearedRay::new(o, target - o).intersect(&corners, f32::INFINITY) else { continue };
+                let Some((t, b, c)) = ShearedRay::new(o, target - o).intersect(&corners, f32::INFINITY) else {
+                    continue;
+                };
                 let place = corners[0] * (1.0 - b - c) + corners[1] * b + corners[2] * c;
                 assert!((o + (target - o) * t - place).length() < 1e-6, "{width} {i}: {}", place - target);
             }

@@ -116,14 +116,14 @@ fn shells(random: &mut Random) -> (Scene, Ray) {
 type Exact = [(DVec3, DVec3); 2];
 
 /// One meeting by dual numbers: the footprint, and what leaves in the way of the kernel's `next`.
-fn step(scene: &Scene, place: DVec3, v: DVec3, surface: &Surface, exact: &Exact, eta: Option<f64>) -> (Exact, f64) {
+fn step(scene: &Scene, ray: &Ray, surface: &Surface, exact: &Exact, eta: Option<f64>) -> (Exact, f64) {
     let sphere = scene.geometry.spheres[surface.primitive as usize];
     let (center, radius) = (sphere.center.as_dvec3(), f64::from(sphere.radius));
     let mut cosine = 0.0;
     let next = exact.map(|(dp, dv)| {
         // Of length 1 in first order too: the kernel's rays are not to their last digit those of the step before.
-        let v = Dual3 { v, d: dv }.normalize();
-        let hit = Dual3 { v: place, d: dp }.to_sphere(v, center, radius, !surface.front);
+        let v = Dual3 { v: ray.direction.as_dvec3(), d: dv }.normalize();
+        let hit = Dual3 { v: ray.origin.as_dvec3(), d: dp }.to_sphere(v, center, radius, !surface.front);
         let n = (hit - Dual3::from(center)).normalize() * (if surface.front { 1.0 } else { -1.0 }).into();
         cosine = -v.v.dot(n.v);
         let w = match eta {
@@ -159,8 +159,6 @@ fn follow(scene: &Scene, mut ray: Ray, steps: u32, spread: f64, outcome: &mut Ou
     let (t, b) = ray.direction.as_dvec3().any_orthonormal_pair();
     let mut d = Differential { dp: [Vec3::ZERO; 2], dv: [t, b].map(|c| (c * spread).as_vec3()) };
     let mut exact: Exact = d.dv.map(|c| (DVec3::ZERO, c.as_dvec3()));
-    // Where the ray comes from: the last surface, not the start a little off it.
-    let mut place = ray.origin.as_dvec3();
     let (mut compared, mut said_once) = (true, false);
     for number in 1..=steps {
         let Some((distance, surface)) = meet(scene, &intersector, &ray) else { return };
@@ -179,7 +177,7 @@ fn follow(scene: &Scene, mut ray: Ray, steps: u32, spread: f64, outcome: &mut Ou
             false => reflected(scene, &surface, v, &d),
         };
         let eta = through.then_some(f64::from(weights.eta));
-        let (carried, cosine) = step(scene, place, v.as_dvec3(), &surface, &exact, eta);
+        let (carried, cosine) = step(scene, &ray, &surface, &exact, eta);
         let behind = next.direction.dot(surface.normal).abs();
         compared &= cosine > LEAST_COSINE && f64::from(behind) > LEAST_COSINE && !said_once;
         if compared {
@@ -196,7 +194,6 @@ fn follow(scene: &Scene, mut ray: Ray, steps: u32, spread: f64, outcome: &mut Ou
         let all = next.differential.dp.into_iter().chain(next.differential.dv);
         outcome.finite(all.flat_map(|c| c.as_dvec3().to_array()), at);
         d = next.differential;
-        place = surface.position.as_dvec3();
         ray = Ray { origin: next.origin, direction: next.direction };
     }
 }

@@ -121,8 +121,7 @@ fn all(name: &'static str, count: u64, one: impl Fn(u64, &mut Random, &mut Outco
         .into_par_iter()
         .map(|part| {
             let mut outcome = Outcome::default();
-            (part * 512..(part * 512 + 512).min(count))
-                .for_each(|i| one(i, &mut Random::new(name, i), &mut outcome));
+            (part * 512..(part * 512 + 512).min(count)).for_each(|i| one(i, &mut Random::new(name, i), &mut outcome));
             outcome
         })
         .reduce(Outcome::default, Outcome::and)
@@ -166,7 +165,8 @@ fn transfer() -> Outcome {
         let origin = Dual3 { v: DVec3::ZERO, d: dp.as_dvec3() };
         let exact = origin.to_plane(Dual3 { v: vd, d: dv.as_dvec3() }, vd * f64::from(s), nd).d;
         let terms = (dp.as_dvec3().dot(nd).abs() + f64::from(s) * dv.as_dvec3().dot(nd).abs()) / vd.dot(nd).abs();
-        outcome.see((found - exact).length() / exact.length().max(terms), || format!("v {v} n {n}: {found} for {exact}"));
+        outcome
+            .see((found - exact).length() / exact.length().max(terms), || format!("v {v} n {n}: {found} for {exact}"));
     })
 }
 
@@ -303,7 +303,9 @@ fn total_reflection() -> Outcome {
         let d = Differential { dp: [Vec3::X, Vec3::Z], dv: [Vec3::X, Vec3::Z] };
         let mirror = reflected(&scene, &surface, v, &d);
         let exact = DVec3::new(vd.x, -vd.y, vd.z);
-        outcome.see((mirror.direction.as_dvec3() - exact).length(), || format!("v {v}: reflected to {}", mirror.direction));
+        outcome.see((mirror.direction.as_dvec3() - exact).length(), || {
+            format!("v {v}: reflected to {}", mirror.direction)
+        });
         let through = refracted(&scene, &surface, v, &d, weights.eta);
         let root = (1.0 - (eta * libm::sin(incident)).powi(2)).max(0.0).sqrt();
         // Where the root is the rounding of its terms, so is the direction.
@@ -457,11 +459,7 @@ fn smooth(aspect: f64, spread: f64, random: &mut Random) -> Geometry {
         let phi = random.range(0.0, std::f64::consts::TAU);
         (n * cos + (x * libm::cos(phi) + y * libm::sin(phi)) * sin).as_vec3()
     });
-    Geometry {
-        normals: normals.into(),
-        corner_normals: vec![[0, 1, 2]],
-        ..mesh(corners.into(), vec![[0, 1, 2]])
-    }
+    Geometry { normals: normals.into(), corner_normals: vec![[0, 1, 2]], ..mesh(corners.into(), vec![[0, 1, 2]]) }
 }
 
 fn smooth_normal() -> Outcome {
@@ -521,7 +519,8 @@ fn horizon() -> Outcome {
         let (sin, cos) = libm::sincos(angle(i / 4, random));
         let along = flat.cross(random.direction()).normalize_or(flat.any_orthonormal_vector());
         let v = (along * cos - flat * sin).as_vec3();
-        let Some((_, surface)) = meet(&scene, &intersector, &Ray { origin: (at - v.as_dvec3()).as_vec3(), direction: v })
+        let Some((_, surface)) =
+            meet(&scene, &intersector, &Ray { origin: (at - v.as_dvec3()).as_vec3(), direction: v })
         else {
             return;
         };

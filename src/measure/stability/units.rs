@@ -53,8 +53,8 @@ pub const CASES: &[Case] = &[
 ];
 
 /// Rounding moves a photon by 10⁻⁷ of the scene, and sends one in some 10⁵ another way: that changes an image by the
-/// root of that part of its noise. A tenth is far more, and far less than a wrong unit anywhere makes.
-const ROUNDING: f64 = 0.1;
+/// root of that part of its noise. This is some times more, and far less than a wrong unit anywhere makes.
+const ROUNDING: f64 = 0.02;
 
 const ESTIMATORS: [&str; 5] = ["density", "regular", "coplanar", "multi_sampled:n=4", "integrated"];
 const SIZE: [u32; 2] = [32, 24];

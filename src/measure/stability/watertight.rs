@@ -27,7 +27,7 @@ pub const CASES: &[Case] = &[
     Case {
         group: "watertight",
         name: "every-triangle",
-        what: "distance to the nearest surface, and whether any is nearer; relative error",
+        what: "distance to the nearest surface, and whether any is nearer; relative error, of 1e-5 of the size at least",
         range: "axis-parallel rays with zeros of both signs, starts on surfaces and 1e4 radii away; scales 1e-6 to 1e6",
         oracle: "all triangles in f64, by planes and edges",
         limit: F32,
@@ -57,6 +57,8 @@ pub const CASES: &[Case] = &[
 struct Star {
     name: &'static str,
     geometry: Geometry,
+    /// Least distance of the surface from the centre.
+    thin: f64,
     /// Rays at each scale; fewer where each meets the boxes of thousands of triangles.
     rays: u64,
 }
@@ -123,10 +125,11 @@ fn bipyramid(sides: u32) -> (Vec<DVec3>, Vec<[u32; 3]>) {
 }
 
 fn stars() -> Vec<Star> {
-    let star = |name, rays, (points, faces): (Vec<DVec3>, Vec<[u32; 3]>), place: &dyn Fn(usize, DVec3) -> DVec3| {
-        let positions = points.iter().enumerate().map(|(i, &p)| place(i, p).as_vec3()).collect();
-        Star { name, geometry: mesh(positions, faces), rays }
-    };
+    let star =
+        |name, thin, rays, (points, faces): (Vec<DVec3>, Vec<[u32; 3]>), place: &dyn Fn(usize, DVec3) -> DVec3| {
+            let positions = points.iter().enumerate().map(|(i, &p)| place(i, p).as_vec3()).collect();
+            Star { name, geometry: mesh(positions, faces), thin, rays }
+        };
     let turned = |p: DVec3| {
         let axis = DVec3::new(0.3, 0.8, -0.5).normalize();
         p * 0.6 + axis.cross(p) * 0.8 + axis * (axis.dot(p) * 0.4)
@@ -134,20 +137,19 @@ fn stars() -> Vec<Star> {
     let (points, faces) = icosphere(0);
     let thrice = faces.iter().flat_map(|f| [*f, [f[1], f[2], f[0]], *f]).collect();
     vec![
-        star("sphere", 700_000, icosphere(4), &|_, p| p),
-        star("thorns", 100_000, icosphere(3), &|i, p| p * Random::new("thorns", i as u64).decade(-2.0, 0.0)),
-        star("needle sphere", 200_000, icosphere(1), &|_, p| turned(p * DVec3::new(1.0, 1e-2, 1e-4))),
-        star("needle fan", 6_000, bipyramid(1024), &|_, p| turned(p * DVec3::new(1.0, 1.0, 1e-3))),
-        star("fan", 6_000, bipyramid(4096), &|_, p| p),
-        star("tetrahedron", 600_000, bipyramid(3), &|_, p| turned(p)),
-        star("thrice", 450_000, (points, thrice), &|_, p| turned(p)),
+        star("sphere", 0.9, 700_000, icosphere(4), &|_, p| p),
+        star("thorns", 5e-3, 100_000, icosphere(3), &|i, p| p * Random::new("thorns", i as u64).decade(-2.0, 0.0)),
+        star("needle sphere", 5e-5, 200_000, icosphere(1), &|_, p| turned(p * DVec3::new(1.0, 1e-2, 1e-4))),
+        star("needle fan", 2e-4, 6_000, bipyramid(1024), &|_, p| turned(p * DVec3::new(1.0, 1.0, 1e-3))),
+        star("fan", 0.2, 6_000, bipyramid(4096), &|_, p| p),
+        star("tetrahedron", 0.1, 600_000, bipyramid(3), &|_, p| turned(p)),
+        star("thrice", 0.7, 450_000, (points, thrice), &|_, p| turned(p)),
     ]
 }
 
 /// The same about the same centre, `scale` times as large, and its radius.
 fn scaled(star: &Star, scale: f64) -> (Geometry, f32) {
-    let positions: Vec<Vec3> =
-        star.geometry.positions.iter().map(|p| (p.as_dvec3() * scale).as_vec3()).collect();
+    let positions: Vec<Vec3> = star.geometry.positions.iter().map(|p| (p.as_dvec3() * scale).as_vec3()).collect();
     let radius = positions.iter().map(|p| p.length()).fold(0.0, f32::max);
     (Geometry { positions, ..star.geometry.clone() }, radius)
 }
@@ -159,7 +161,6 @@ fn apart(g: &Geometry, ray: &Ray, hit: &Hit) -> f64 {
     let place = a + (b - a) * wb + (c - a) * wc;
     (ray.origin.as_dvec3() + ray.direction.as_dvec3() * f64::from(hit.t) - place).length()
 }
-
 
 fn edges_and_vertices() -> Outcome {
     let scales = [1.0, 1e-6, 0.3e-3, 7e2, 1e6];
@@ -181,9 +182,12 @@ fn edges_and_vertices() -> Outcome {
                 };
                 let outside = i % 8 >= 4;
                 // From within: from the centre or near it. From without: towards the centre, through the target.
-                let near = target * if i % 3 == 0 { 0.0 } else { random.range(-0.2, 0.9) as f32 * 1e-2 };
+                let inner = if i % 4 == 3 { p.lerp(q, 0.7) } else { target };
+                let near = inner * if i % 3 == 0 { 0.0 } else { random.range(-0.2, 0.9) as f32 * 1e-2 };
                 let (origin, end) = if outside {
-                    let away = if i % 3 == 0 { random.decade(0.0, 4.0) } else { random.range(0.0, 3.0) };
+                    // As far away as a direction in f32 can be aimed at it from.
+                    let farthest = libm::log10(star.thin / (4.0 * F32)).min(4.0);
+                    let away = if i % 3 == 0 { random.decade(0.0, farthest) } else { random.range(0.0, 3.0) };
                     (target + target.normalize() * (radius * (1e-3 + away as f32)), Vec3::ZERO)
                 } else {
                     (near, target)
@@ -192,7 +196,7 @@ fn edges_and_vertices() -> Outcome {
                 let ray = Ray { origin, direction };
                 let hit = intersector.closest(&ray);
                 let way = if outside { origin.length() } else { f32::INFINITY };
-                let leaks = hit.is_none_or(|h| h.t > way);
+                let leaks = hit.is_none_or(|h| h.t > way * (1.0 + 2.0 * f32::EPSILON));
                 outcome.expect(!leaks, || format!("{} × {scale}: {ray:?} leaks at {target}", star.name));
                 if let Some(hit) = hit {
                     let size = f64::from(hit.t.max(origin.length()).max(radius));
@@ -277,7 +281,7 @@ fn every_triangle() -> Outcome {
                 };
                 let ray = Ray { origin, direction };
                 // What is met for certain, and what may be by rounding of an edge or of the start.
-                let small = f64::from(radius.max(origin.length())) * 1e-9;
+                let small = f64::from(radius.max(origin.length())) * 1e-7;
                 let mut certain = f64::MAX;
                 let mut possible = Vec::new();
                 for k in 0..g.triangles.len() {
@@ -294,11 +298,11 @@ fn every_triangle() -> Outcome {
                 let hit = intersector.closest(&ray);
                 let place = || format!("{} × {scale}: {ray:?} {hit:?} for {certain:e}", star.name);
                 let t = hit.map_or(f64::MAX, |h| f64::from(h.t));
-                outcome.expect(t <= certain * (1.0 + F32), || format!("{} is missed", place()));
+                outcome.expect(t <= certain * (1.0 + F32) + 1e-3 * small, || format!("{} is missed", place()));
                 // A start on a face is as exact as its coordinates.
                 if let Some(hit) = hit.filter(|_| t > small) {
                     let error = possible.iter().map(|p| (p - t).abs()).fold(f64::MAX, f64::min);
-                    outcome.see(error / t, place);
+                    outcome.see(error / t.max(100.0 * small), place);
                     let any = |t| intersector.any(&ray, t);
                     outcome.expect(!any(hit.t) && any(hit.t * (1.0 + 2.0 * f32::EPSILON)), || {
                         format!("{}: any says {} {}", place(), any(hit.t), any(hit.t * (1.0 + 2.0 * f32::EPSILON)))
@@ -396,7 +400,7 @@ fn duplicates() -> Outcome {
         .chain(rayon::iter::once(&nested))
         .map(|g| {
             // Of those nested, the ones that a direction in f32 can be aimed at.
-            let aims = if g.triangles.len() == nested.triangles.len() { 60 } else { g.triangles.len() };
+            let aims = if g.triangles.len() == nested.triangles.len() { 45 } else { g.triangles.len() };
             let mut outcome = Outcome::default();
             let intersector = Intersector::new(g, 1.0);
             let key = |k: usize| g.corners(k).map(|p| p.to_array().map(f32::to_bits));
@@ -407,9 +411,12 @@ fn duplicates() -> Outcome {
             for i in 0..4000 {
                 let random = &mut Random::new("duplicate-rays", i);
                 let [a, b, c] = g.corners((random.unit() * aims as f64) as usize);
-                let target = a.lerp(b, 0.3).lerp(c, 0.9 * random.unit() as f32);
+                let target = a.lerp(b, 0.3).lerp(c, 0.1 + 0.8 * random.unit() as f32);
                 let origin = (random.direction() * random.range(0.0, 3.0)).as_vec3();
                 let ray = Ray { origin, direction: (target - origin).as_dvec3().normalize().as_vec3() };
+                if (b - a).cross(c - a).normalize_or_zero().dot(ray.direction).abs() < 0.1 {
+                    continue;
+                }
                 let hit = intersector.closest(&ray);
                 outcome.expect(hit.is_some(), || format!("{ray:?} misses {target}"));
                 if let Some(hit) = hit {
