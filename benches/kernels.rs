@@ -17,7 +17,7 @@ use cusp::render::{RenderSettings, Renderer};
 use cusp::scene::open;
 use cusp::scene::scene_file::RenderFile;
 use cusp::trace::Ray;
-use glam::{DVec2, Vec3};
+use glam::{DVec2, DVec3, Vec3};
 use std::hint::black_box;
 
 /// The caustic photons of the ring and a grid of view hits inside it.
@@ -94,7 +94,7 @@ fn gather_and_estimate(c: &mut Criterion) {
         let e: Box<dyn Estimator> = estimator(name).expect("registered");
         group.bench_function(BenchmarkId::from_parameter(name), |b| {
             b.iter(|| {
-                let mut sum = Vec3::ZERO;
+                let mut sum = DVec3::ZERO;
                 for (v, indices) in views.iter().zip(&lists) {
                     sum += e.irradiance(&Gathered { photons: map.photons(), indices, radius: 0.0 }, v);
                 }
@@ -140,7 +140,7 @@ fn polygon(c: &mut Criterion) {
             });
         });
         group.bench_function("8x8_points (baseline)", |b| {
-            b.iter(|| cases.iter().map(|[c, u, v]| eight.mean(*c, *u, *v)).sum::<f32>());
+            b.iter(|| cases.iter().map(|[c, u, v]| eight.mean(*c, *u, *v)).sum::<f64>());
         });
         group.finish();
     }

@@ -79,6 +79,10 @@ pub fn text(report: &CompareReport, folder: &Path) -> String {
             if cost.needed_stored > 0 { cost.full_seconds / cost.needed_seconds } else { 1.0 }
         ));
     }
+    let bounded = r.bounded.lines();
+    if !bounded.is_empty() {
+        out.push_str(&format!("\n{}\n", bounded.join("\n")));
+    }
     out.push_str(&format!("\n{:.1} s in all; files in {}\n", r.seconds.total, folder.display()));
     out
 }

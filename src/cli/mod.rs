@@ -13,6 +13,7 @@ pub mod paper;
 pub mod progress;
 pub mod render;
 pub mod shot;
+pub mod stress;
 pub mod study;
 pub mod table;
 pub mod window;
@@ -49,6 +50,8 @@ enum Command {
     Study(study::StudyArgs),
     /// The shards of a study as one
     Merge(study::merge::MergeArgs),
+    /// The stability cases: worst errors of kernels and renders on stiff and extreme input; exit 1 if one fails
+    Stress(stress::StressArgs),
     /// A figure or table of the papers, reproduced
     Paper(paper::PaperArgs),
     /// The workbench drawn to a file, without a window
@@ -81,6 +84,7 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
         Some(Command::Diff(args)) => diff::run(&args),
         Some(Command::Study(args)) => study::run(&args),
         Some(Command::Merge(args)) => study::merge::run(&args),
+        Some(Command::Stress(args)) => stress::run(&args),
         Some(Command::Paper(args)) => paper::run(&args),
         Some(Command::Shot(args)) => shot::run(&args),
         Some(Command::Scenes(args)) => lists::scenes(&args),

@@ -203,5 +203,5 @@ fn summary(r: &RenderReport, path: &str, rule: &StopRule) -> String {
         s.other,
         s.total,
         stop_line(r, rule)
-    )
+    ) + &r.bounded.lines().iter().map(|l| format!("{l}\n")).collect::<String>()
 }

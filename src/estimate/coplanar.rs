@@ -10,9 +10,11 @@ use crate::estimate::clip::{self, ClippedPolygon, HalfPlane, MAX_CORNERS, MAX_VE
 use crate::estimate::kernel::silverman;
 use crate::estimate::polygon::{mean_over_parallelogram, mean_over_part};
 use crate::estimate::settings::{Spec, SpecError};
-use crate::math::rgb::Rgb;
 use crate::photons::MapPhoton;
-use glam::{DVec2, Vec3};
+use glam::{DVec2, DVec3, Vec3};
+
+/// Cosine below which a photon's plane seen along the ray has no area that f32 could tell.
+const EDGE_ON: f64 = 1e-12;
 
 /// How the photon's footprint is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -75,15 +77,18 @@ impl Coplanar {
     /// Centre and half-edges of the view footprint in the photon's footprint, along the view ray; None if it is far off.
     #[inline]
     pub fn projected(photon: &MapPhoton, view: &View) -> Option<[DVec2; 3]> {
-        let v = view.direction;
-        let across = photon.normal.dot(v);
-        if across.abs() < 1e-6 {
-            // Seen edge-on the photon covers nothing.
+        // In f64: along a grazing ray the projection divides by next to nothing.
+        let (v, n) = (view.direction.as_dvec3(), photon.normal.as_dvec3());
+        let across = n.dot(v);
+        if across.abs() < EDGE_ON {
             return None;
         }
+        let rows = [photon.rows[0].as_dvec3(), photon.rows[1].as_dvec3()];
+        // The row times the projection, once for all three vectors.
+        let rows = rows.map(|r| r - n * (r.dot(v) / across));
         let project = |x: Vec3| {
-            let y = x - v * (photon.normal.dot(x) / across);
-            DVec2::new(f64::from(photon.rows[0].dot(y)), f64::from(photon.rows[1].dot(y)))
+            let x = x.as_dvec3();
+            photon.to_own(DVec2::new(rows[0].dot(x), rows[1].dot(x)))
         };
         let offset = view.query.center - photon.position;
         let [a, b] = view.query.axes;
@@ -172,7 +177,7 @@ impl Estimator for Coplanar {
         self.over_area(photon, view)
     }
 
-    fn irradiance(&self, gathered: &Gathered, view: &View) -> Rgb {
+    fn irradiance(&self, gathered: &Gathered, view: &View) -> DVec3 {
         weighted_sum(gathered, |p| self.over_area(p, view))
     }
 

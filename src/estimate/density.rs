@@ -3,8 +3,8 @@
 use super::{Estimator, Gathered, Lookup, View, weighted_sum};
 use crate::estimate::kernel::Kernel;
 use crate::estimate::settings::{Spec, SpecError};
-use crate::math::rgb::Rgb;
 use crate::photons::MapPhoton;
+use glam::DVec3;
 
 /// Density estimation with a radial kernel of distance over radius.
 pub struct Density {
@@ -54,7 +54,7 @@ impl Estimator for Density {
         self.kernel.value(d2 / r2) / (std::f64::consts::PI * r2)
     }
 
-    fn irradiance(&self, gathered: &Gathered, view: &View) -> Rgb {
+    fn irradiance(&self, gathered: &Gathered, view: &View) -> DVec3 {
         weighted_sum(gathered, |p| self.weight(p, view, gathered.radius))
     }
 }

@@ -3,8 +3,8 @@
 use super::{Estimator, Gathered, Lookup, View, weighted_sum};
 use crate::estimate::polygon::mean_over_parallelogram;
 use crate::estimate::settings::{Spec, SpecError};
-use crate::math::rgb::Rgb;
 use crate::photons::MapPhoton;
+use glam::DVec3;
 
 /// The closed form; it has no settings.
 pub struct Integrated;
@@ -52,7 +52,7 @@ impl Estimator for Integrated {
         over_area(photon, view)
     }
 
-    fn irradiance(&self, gathered: &Gathered, view: &View) -> Rgb {
+    fn irradiance(&self, gathered: &Gathered, view: &View) -> DVec3 {
         weighted_sum(gathered, |p| over_area(p, view))
     }
 }

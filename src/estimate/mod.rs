@@ -17,7 +17,6 @@ mod energy_tests;
 
 pub use construction::{Construction, SamplingPoint};
 
-use crate::math::rgb::Rgb;
 use crate::photons::MapPhoton;
 use crate::photons::map::Query;
 use glam::{DVec3, Vec3};
@@ -81,8 +80,8 @@ pub trait Estimator: Send + Sync {
     /// Weight of one photon, 1/m²: its kernel's mean over the view footprint, over its area. Finite, not negative.
     fn weight(&self, photon: &MapPhoton, view: &View, radius: f32) -> f64;
 
-    /// Irradiance, W/m²: the sum of powers times weights.
-    fn irradiance(&self, gathered: &Gathered, view: &View) -> Rgb;
+    /// Irradiance of each channel, W/m²: the sum of powers times weights, which f64 can always hold.
+    fn irradiance(&self, gathered: &Gathered, view: &View) -> DVec3;
 
     /// What it does with one photon, as plain geometry; nothing by default.
     fn construction(&self, _photon: &MapPhoton, _view: &View) -> Construction {
@@ -96,8 +95,8 @@ pub trait Estimator: Send + Sync {
     }
 }
 
-/// Sum of the gathered photons' powers times `weight`, in f64; clamped to what f32 can hold.
-fn weighted_sum(gathered: &Gathered, weight: impl Fn(&MapPhoton) -> f64) -> Rgb {
+/// Sum of the gathered photons' powers times `weight`.
+fn weighted_sum(gathered: &Gathered, weight: impl Fn(&MapPhoton) -> f64) -> DVec3 {
     let mut sum = DVec3::ZERO;
     for &i in gathered.indices {
         let photon = &gathered.photons[i as usize];
@@ -106,5 +105,5 @@ fn weighted_sum(gathered: &Gathered, weight: impl Fn(&MapPhoton) -> f64) -> Rgb 
             sum += photon.power.as_dvec3() * w;
         }
     }
-    sum.min(DVec3::splat(f64::from(f32::MAX))).as_vec3()
+    sum
 }

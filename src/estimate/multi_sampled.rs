@@ -2,9 +2,8 @@
 
 use super::{Construction, Estimator, Gathered, Lookup, SamplingPoint, View, weighted_sum};
 use crate::estimate::settings::{Spec, SpecError};
-use crate::math::rgb::Rgb;
 use crate::photons::MapPhoton;
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 /// Where the sampling points lie in `[-1, 1]`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -17,6 +16,8 @@ pub enum Grid {
 
 /// Points handled together.
 const LANES: usize = 8;
+/// Rows of points that are added up in f32.
+const ROWS: usize = 8;
 
 /// N×N sampling points, evaluated in filter space.
 pub struct MultiSampled {
@@ -62,27 +63,32 @@ impl MultiSampled {
 
     /// Mean of `(1 - u)²` over the points `c + s a + t b` of filter space.
     #[inline]
-    pub fn mean(&self, c: Vec3, a: Vec3, b: Vec3) -> f32 {
+    pub fn mean(&self, c: Vec3, a: Vec3, b: Vec3) -> f64 {
         let (aa, bb, cc) = (a.length_squared(), b.length_squared(), c.length_squared());
         let reach = 1.0 + aa.sqrt() + bb.sqrt();
         if cc >= reach * reach {
             return 0.0;
         }
-        let mut sums = [0.0f32; LANES];
-        for &t in &self.offsets {
-            let row = c + b * t;
-            for (offset, weight) in &self.lanes {
-                for l in 0..LANES {
-                    let x = row.x + a.x * offset[l];
-                    let y = row.y + a.y * offset[l];
-                    let z = row.z + a.z * offset[l];
-                    let k = (1.0 - (x * x + y * y + z * z)).max(0.0);
-                    sums[l] += weight[l] * (k * k);
+        // Sums in f32 are kept short: what thousands of terms lose to rounding is as much as they differ by.
+        let mut sum = 0.0f64;
+        for rows in self.offsets.chunks(ROWS) {
+            let mut sums = [0.0f32; LANES];
+            for &t in rows {
+                let row = c + b * t;
+                for (offset, weight) in &self.lanes {
+                    for l in 0..LANES {
+                        let x = row.x + a.x * offset[l];
+                        let y = row.y + a.y * offset[l];
+                        let z = row.z + a.z * offset[l];
+                        let k = (1.0 - (x * x + y * y + z * z)).max(0.0);
+                        sums[l] += weight[l] * (k * k);
+                    }
                 }
             }
+            let pairs = [sums[0] + sums[4], sums[1] + sums[5], sums[2] + sums[6], sums[3] + sums[7]];
+            sum += f64::from((pairs[0] + pairs[2]) + (pairs[1] + pairs[3]));
         }
-        let pairs = [sums[0] + sums[4], sums[1] + sums[5], sums[2] + sums[6], sums[3] + sums[7]];
-        ((pairs[0] + pairs[2]) + (pairs[1] + pairs[3])) / (self.n * self.n) as f32
+        sum / f64::from(self.n * self.n)
     }
 
     #[inline]
@@ -90,7 +96,7 @@ impl MultiSampled {
         // The two footprint vectors enter filter space once for each photon, not once for each point.
         let c = photon.to_filter(view.query.center - photon.position);
         let [a, b] = view.query.axes.map(|v| photon.to_filter(v));
-        3.0 * f64::from(self.mean(c, a, b)) * f64::from(photon.inverse_area)
+        3.0 * self.mean(c, a, b) * f64::from(photon.inverse_area)
     }
 }
 
@@ -119,7 +125,7 @@ impl Estimator for MultiSampled {
         self.over_area(photon, view)
     }
 
-    fn irradiance(&self, gathered: &Gathered, view: &View) -> Rgb {
+    fn irradiance(&self, gathered: &Gathered, view: &View) -> DVec3 {
         weighted_sum(gathered, |p| self.over_area(p, view))
     }
 

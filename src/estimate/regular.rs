@@ -3,8 +3,8 @@
 use super::{Construction, Estimator, Gathered, Lookup, SamplingPoint, View, weighted_sum};
 use crate::estimate::kernel::silverman;
 use crate::estimate::settings::{Spec, SpecError};
-use crate::math::rgb::Rgb;
 use crate::photons::MapPhoton;
+use glam::DVec3;
 
 /// The filtered radiance estimate at a point.
 pub struct Regular {
@@ -83,7 +83,7 @@ impl Estimator for Regular {
         kernel_over_area(photon, view)
     }
 
-    fn irradiance(&self, gathered: &Gathered, view: &View) -> Rgb {
+    fn irradiance(&self, gathered: &Gathered, view: &View) -> DVec3 {
         weighted_sum(gathered, |p| kernel_over_area(p, view))
     }
 

@@ -1,19 +1,28 @@
 //! A photon's footprint made ready: its filter transform, area and reach.
 
-use glam::{DVec3, Vec3};
+use glam::{DVec2, DVec3, Vec2, Vec3};
 
-/// The transform from world to filter space, where the photon is the unit disc (Pedersen 2011, eq. 45 corrected).
+/// The transform from world to filter space, where the photon is the unit disc (Pedersen 2011, eq. 45 corrected), along
+/// the principal axes of its ellipse.
+///
+/// The thesis inverts the matrix of `dα`, `dβ` and the normal. Where those two are nearly parallel, as near a caustic's
+/// focus, its rows are long and nearly opposite, and what f32 leaves of them says little about a point. Along the
+/// principal axes a transformed point is the exact image of one that lies within a few units in the last place of its
+/// distance, whatever the condition; the footprint's own coordinates are a turn away.
 #[derive(Clone, Copy, Debug)]
 pub struct FilterTransform {
-    /// Rows of M_pd, 1/metre: filter coordinates are their dot products with `x - x_pd`.
+    /// Rows, 1/metre: filter coordinates are their dot products with `x - x_pd`. Along the longest and the shortest
+    /// semi-axis of the ellipse, and off its plane.
     pub rows: [Vec3; 3],
+    /// Cosine and sine of the turn about the normal from filter coordinates to those in `dα` and `dβ`.
+    pub turn: Vec2,
     /// 1/A with `A = π ‖dα × dβ‖`, 1/m² (eq. 40 corrected).
     pub inverse_area: f32,
     /// Largest singular value of the footprint, metres: the radius of the ball that holds its ellipsoid.
     pub reach: f32,
     /// Half-size of the box around its ellipsoid, metres.
     pub half_extent: Vec3,
-    /// Whether an axis was raised to the floor.
+    /// Whether an axis was raised to the floor, or the area to the smallest that f32 has an inverse of.
     pub floored: bool,
     /// Whether an axis was lowered to the ceiling.
     pub capped: bool,
@@ -22,48 +31,50 @@ pub struct FilterTransform {
 impl FilterTransform {
     /// Prepares a footprint `(dα, dβ)` on a surface of unit `normal`, its axes times `scale`.
     ///
-    /// The third column of M⁻¹ is the normal times the longest semi-axis, so that off-plane distance is measured in
-    /// the footprint's own size. Semi-axes below `floor` (metres, the resolution of f32 at this place) are raised to
-    /// it, and those above `ceiling` lowered: a footprint that shrank to a line or a point keeps all its power on
-    /// the smallest ellipse that can be told from it.
+    /// Off-plane distance is measured in the longest semi-axis, the footprint's own size. Semi-axes below `floor`
+    /// (metres, the resolution of f32 at this place) are raised to it, and those above `ceiling` lowered: a footprint
+    /// that shrank to a line or a point keeps all its power on the smallest ellipse that can be told from it. A column
+    /// that is not finite counts as none.
     pub fn new(footprint: [Vec3; 2], normal: Vec3, scale: f32, floor: f32, ceiling: f32) -> Self {
         let n = normal.as_dvec3();
+        let n = n * (1.0 / n.length());
         let (floor, ceiling) = (f64::from(floor), f64::from(ceiling));
         let column = |c: Vec3| {
             let c = c.as_dvec3() * f64::from(scale);
             if c.is_finite() { c - n * n.dot(c) } else { DVec3::ZERO }
         };
-        let (mut a, mut b) = (column(footprint[0]), column(footprint[1]));
-        let principal = Principal::of(a, b, n);
-        let limit = |s: f64| s.clamp(floor, ceiling);
-        let (long, short) = (limit(principal.long), limit(principal.short));
-        let floored = principal.short < floor;
-        let capped = principal.long > ceiling;
-        if floored || capped {
-            // The ellipse alone counts, so any two conjugate half-axes will do.
-            a = principal.axis * long;
-            b = n.cross(principal.axis) * short;
-        }
-        let c = n * long;
-        let det = a.cross(b).dot(c);
-        let rows = [b.cross(c) / det, c.cross(a) / det, a.cross(b) / det];
-        let half = |i: usize| (a[i] * a[i] + b[i] * b[i] + c[i] * c[i]).sqrt() as f32;
+        let principal = Principal::of(column(footprint[0]), column(footprint[1]), n);
+        let (long, short) = (principal.long.clamp(floor, ceiling), principal.short.clamp(floor, ceiling));
+        let axes = [principal.axis, principal.across, n];
+        let rows = [axes[0] * (1.0 / long), axes[1] * (1.0 / short), axes[2] * (1.0 / long)];
+        let half = |i: usize| {
+            let [a, b, c] = [axes[0][i] * long, axes[1][i] * short, axes[2][i] * long];
+            (a * a + b * b + c * c).sqrt() as f32
+        };
+        let inverse_area = 1.0 / (std::f64::consts::PI * long * short);
+        let largest = f64::from(f32::MAX);
         Self {
             rows: rows.map(|r| r.as_vec3()),
-            inverse_area: (1.0 / (std::f64::consts::PI * long * short)).min(f64::from(f32::MAX)) as f32,
+            turn: principal.turn.as_vec2(),
+            inverse_area: inverse_area.min(largest) as f32,
             reach: long as f32,
             half_extent: Vec3::new(half(0), half(1), half(2)),
-            floored,
-            capped,
+            floored: principal.short < floor || inverse_area > largest,
+            capped: principal.long > ceiling,
         }
     }
 }
 
-/// Singular values of two vectors in a plane, and the direction of the longer.
+/// Singular value decomposition of two vectors in a plane.
 struct Principal {
     long: f64,
     short: f64,
+    /// Unit vector along the longest semi-axis.
     axis: DVec3,
+    /// Unit vector along the shortest, on the side where the turn below needs no mirror.
+    across: DVec3,
+    /// Cosine and sine of the turn from coordinates along both, over their lengths, to those in the two vectors.
+    turn: DVec2,
 }
 
 impl Principal {
@@ -73,11 +84,21 @@ impl Principal {
         let root = (half_difference * half_difference + ab * ab).sqrt();
         let long = ((aa + bb) / 2.0 + root).sqrt();
         // The product of the singular values is the determinant, which does not cancel.
-        let short = if long > 0.0 { a.cross(b).length() / long } else { 0.0 };
+        let det = a.cross(b).dot(n);
+        let short = if long > 0.0 { det.abs() / long } else { 0.0 };
         // (cos θ, sin θ) of the right singular vector, from the half angle that does not cancel.
         let (c, s) = if half_difference >= 0.0 { (half_difference + root, ab) } else { (ab, root - half_difference) };
-        let axis = (a * c + b * s).try_normalize().or(a.try_normalize()).unwrap_or_else(|| n.any_orthonormal_vector());
-        Self { long, short, axis }
+        let right = DVec2::new(c, s);
+        let (axis, turn) = match (right.try_normalize(), a.try_normalize()) {
+            (Some(right), first) => match (a * right.x + b * right.y).try_normalize() {
+                Some(axis) => (axis, right),
+                None => (first.unwrap_or_else(|| n.any_orthonormal_vector()), DVec2::X),
+            },
+            // A circle has no longest axis; any will do.
+            (None, Some(first)) => (first, DVec2::X),
+            (None, None) => (n.any_orthonormal_vector(), DVec2::X),
+        };
+        Self { long, short, axis, across: n.cross(axis) * 1f64.copysign(det), turn }
     }
 }
 
@@ -90,12 +111,20 @@ mod tests {
         Vec3::new(t.rows[0].dot(v), t.rows[1].dot(v), t.rows[2].dot(v))
     }
 
+    /// Coordinates in `dα` and `dβ`.
+    fn own(t: &FilterTransform, v: Vec3) -> Vec3 {
+        t.turn.rotate(filter(t, v).truncate()).extend(filter(t, v).z)
+    }
+
     #[test]
     fn axes_map_to_unit_vectors() {
         let (a, b) = (Vec3::new(0.2, 0.0, 0.1), Vec3::new(-0.05, 0.0, 0.3));
         let t = FilterTransform::new([a, b], Vec3::Y, 2.0, 1e-6, 10.0);
-        assert!((filter(&t, a * 2.0) - Vec3::X).length() < 1e-5);
-        assert!((filter(&t, b * 2.0) - Vec3::Y).length() < 1e-5);
+        assert!((own(&t, a * 2.0) - Vec3::X).length() < 1e-5);
+        assert!((own(&t, b * 2.0) - Vec3::Y).length() < 1e-5);
+        let mirrored = FilterTransform::new([b, a], Vec3::Y, 2.0, 1e-6, 10.0);
+        assert!((own(&mirrored, b * 2.0) - Vec3::X).length() < 1e-5);
+        assert!((own(&mirrored, a * 2.0) - Vec3::Y).length() < 1e-5);
         assert!((filter(&t, Vec3::Y * t.reach).length() - 1.0).abs() < 1e-5);
         let area = std::f32::consts::PI * 4.0 * a.cross(b).length();
         assert!((t.inverse_area * area - 1.0).abs() < 1e-5);
@@ -122,6 +151,24 @@ mod tests {
             let seen = filter(&t, axis.normalize() * t.reach);
             prop_assert!(seen.is_finite());
         }
+    }
+
+    /// What the thesis inverts, in f32, moves a point by its own distance where the axes are nearly parallel.
+    #[test]
+    fn an_inverse_matrix_loses_what_principal_axes_keep() {
+        let (along, across) = (DVec3::new(0.764, 0.0, 0.645).normalize(), DVec3::new(-0.645, 0.0, 0.764).normalize());
+        let axes = [along, along * 0.7 + across * 1e-6].map(|c| c.as_vec3());
+        let [a, b] = axes.map(|c| c.as_dvec3());
+        let x = (along * 0.37 + across * 4e-7).as_vec3();
+        let t = FilterTransform::new(axes, Vec3::Y, 1.0, 1e-12, 10.0);
+        let det = a.cross(b).dot(DVec3::Y);
+        let inverse = [b.cross(DVec3::Y) / det, DVec3::Y.cross(a) / det].map(|r| r.as_vec3());
+        let moved = |back: DVec3| (back - x.as_dvec3()).length();
+        let by_inverse = a * f64::from(inverse[0].dot(x)) + b * f64::from(inverse[1].dot(x));
+        let [long, short, _] = t.rows.map(|r| r.as_dvec3() / r.as_dvec3().length_squared());
+        let by_axes = long * f64::from(t.rows[0].dot(x)) + short * f64::from(t.rows[1].dot(x));
+        assert!(moved(by_axes) < 1e-7, "{}", moved(by_axes));
+        assert!(moved(by_inverse) > 1e-4, "{}", moved(by_inverse));
     }
 
     #[test]

@@ -5,7 +5,7 @@ use crate::photons::Photon;
 use crate::photons::footprint::FilterTransform;
 use crate::photons::kd_tree::{KdTree, Nearest, NearestQuery};
 use crate::photons::overlap::OverlapTree;
-use glam::Vec3;
+use glam::{DVec2, Vec2, Vec3};
 use rayon::prelude::*;
 
 /// Smallest cosine between the normals of a photon's surface and the view hit's for the photon to count.
@@ -20,8 +20,10 @@ pub struct MapPhoton {
     pub position: Vec3,
     /// 1/A, 1/m².
     pub inverse_area: f32,
-    /// Rows of the filter transform M_pd, 1/metre.
+    /// Rows of the filter transform, 1/metre, as [`FilterTransform`] has them.
     pub rows: [Vec3; 3],
+    /// Cosine and sine of the turn from filter coordinates to those in `dα` and `dβ`.
+    pub turn: Vec2,
     /// Largest semi-axis, metres.
     pub reach: f32,
     /// Power, W.
@@ -39,15 +41,18 @@ impl MapPhoton {
         Vec3::new(self.rows[0].dot(v), self.rows[1].dot(v), self.rows[2].dot(v))
     }
 
+    /// Coordinates in `dα` and `dβ` of filter coordinates in the photon's plane.
+    #[inline]
+    pub fn to_own(&self, filter: DVec2) -> DVec2 {
+        self.turn.as_dvec2().rotate(filter)
+    }
+
     /// Half-axes `(dα, dβ)` of its footprint in its tangent plane, metres: scaled, and after floor and ceiling.
-    ///
-    /// From the rows of the filter transform and the area, without an inverse, so that a thin ellipse keeps its digits.
     pub fn axes(&self) -> [Vec3; 2] {
-        let n = self.normal.as_dvec3();
-        let [r0, r1, _] = self.rows.map(|r| r.as_dvec3());
-        let product = 1.0 / (std::f64::consts::PI * f64::from(self.inverse_area));
-        let signed = product.copysign(r0.cross(r1).dot(n));
-        [r1.cross(n) * signed, n.cross(r0) * signed].map(|c| c.as_vec3())
+        // A row is its semi-axis over the square of its length.
+        let [long, short, _] = self.rows.map(|r| r.as_dvec3() / r.as_dvec3().length_squared());
+        let turn = self.turn.as_dvec2();
+        [long * turn.x - short * turn.y, long * turn.y + short * turn.x].map(|c| c.as_vec3())
     }
 
     /// Area of its ellipse, `π ‖dα × dβ‖`, m².
@@ -120,6 +125,7 @@ impl PhotonMap {
                     position: p.position,
                     inverse_area: t.inverse_area,
                     rows: t.rows,
+                    turn: t.turn,
                     reach: t.reach,
                     power: p.power,
                     normal: p.normal,
@@ -132,9 +138,10 @@ impl PhotonMap {
         let (floored, capped) = (count(|t| t.floored), count(|t| t.capped));
         let longest_reach = prepared.iter().fold(0.0f32, |m, (_, t)| m.max(t.reach));
         let (overlap, photons) = if parts.overlap {
-            let (tree, order) = OverlapTree::new(prepared.iter().map(|(p, t)| (p.position, t.half_extent)));
+            let tree = OverlapTree::new(prepared.iter().map(|(p, t)| (p.position, t.half_extent)));
             // In the hierarchy's order, so that a leaf is a range of photons.
-            (Some(tree), order.iter().map(|&i| prepared[i as usize].0).collect())
+            let photons = tree.order().iter().map(|&i| prepared[i as usize].0).collect();
+            (Some(tree), photons)
         } else {
             (None, prepared.iter().map(|(p, _)| *p).collect::<Vec<_>>())
         };

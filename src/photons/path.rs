@@ -133,6 +133,8 @@ impl Flight<'_> {
     ///
     /// Russian roulette keeps the mean power over channels (Pedersen 2011, section 2.1.2); colours shift it between
     /// channels. `index` names the photon in the sequence; `recorder` hears of every surface.
+    ///
+    /// Returns the power that it still carried when the bounce limit ended its path, W; none if it ended by itself.
     #[expect(clippy::too_many_arguments, reason = "outputs that the caller keeps between photons")]
     pub fn trace(
         &self,
@@ -143,7 +145,7 @@ impl Flight<'_> {
         out: &mut StoredPhotons,
         counts: &mut PathCounts,
         recorder: &mut impl PhotonRecorder,
-    ) {
+    ) -> Rgb {
         let scene = self.scene;
         let mut ray = Ray { origin: emission.origin, direction: emission.direction };
         let mut d = emission.differential;
@@ -153,7 +155,7 @@ impl Flight<'_> {
         counts.grazing += u64::from(emission.bounded);
         for bounce in 0..self.settings.max_depth {
             let Some(hit) = self.intersector.closest(&ray) else {
-                return;
+                return Rgb::ZERO;
             };
             let surface = Surface::new(scene, &ray, &hit);
             let v = ray.direction;
@@ -166,7 +168,7 @@ impl Flight<'_> {
             if let Some(inside) = attenuation(scene, medium, hit.t) {
                 match roulette(power, inside, x[1]) {
                     Some(kept) => power = kept,
-                    None => return,
+                    None => return Rgb::ZERO,
                 }
             }
             let material = &scene.materials[surface.material as usize];
@@ -179,7 +181,7 @@ impl Flight<'_> {
                 stored: (material.is_diffuse() && self.keeps(kind)).then_some(kind),
             });
             match material {
-                Material::Emitter { .. } => return,
+                Material::Emitter { .. } => return Rgb::ZERO,
                 Material::Diffuse { .. } => {
                     if self.keeps(kind) {
                         out.of_mut(kind).push(Photon {
@@ -191,11 +193,11 @@ impl Flight<'_> {
                         });
                     }
                     if !self.settings.global {
-                        return;
+                        return Rgb::ZERO;
                     }
                     let reflectance = material.diffuse_reflectance(surface.uv);
                     let Some(kept) = roulette(power, reflectance, x[0]) else {
-                        return;
+                        return Rgb::ZERO;
                     };
                     power = kept;
                     kind = PhotonKind::Global;
@@ -210,7 +212,7 @@ impl Flight<'_> {
                 }
                 _ => {
                     let Some((next, kept, through)) = self.specular(material, &surface, &ray, power, &d, x[0]) else {
-                        return;
+                        return Rgb::ZERO;
                     };
                     power = kept;
                     ray = Ray { origin: next.origin, direction: next.direction };
@@ -229,6 +231,7 @@ impl Flight<'_> {
             }
         }
         counts.depth += 1;
+        power
     }
 
     fn keeps(&self, kind: PhotonKind) -> bool {

@@ -7,7 +7,7 @@ use crate::photons::emission::{quad_normal, sample_triangles};
 use crate::scene::{Light, Scene};
 use crate::trace::surface::SELF_INTERSECTION;
 use crate::trace::{Intersector, Ray};
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use std::f32::consts::PI;
 
 /// How far before a light's own surface a shadow ray ends, in units of the offset at its start and of its length:
@@ -38,12 +38,12 @@ pub fn irradiance(
     rays: u32,
     sequence: &Sequence,
     index: u64,
-) -> Rgb {
-    let mut sum = Rgb::ZERO;
+) -> DVec3 {
+    let mut sum = DVec3::ZERO;
     for (i, light) in scene.lights.iter().enumerate() {
         let has_area = matches!(light, Light::Sphere { .. } | Light::Quad { .. } | Light::Mesh { .. });
         let count = if has_area { rays } else { 1 };
-        let mut own = Rgb::ZERO;
+        let mut own = DVec3::ZERO;
         for ray in 0..count {
             let x = sequence.four(index * u64::from(count) + u64::from(ray), LIGHT_SETS + i as u32);
             if let Some(sample) = sample(light, receiver, scene.radius, x[0], x[1])
@@ -52,7 +52,7 @@ pub fn irradiance(
                 own += sample.irradiance;
             }
         }
-        sum += own / count as f32;
+        sum += own / f64::from(count);
     }
     sum
 }
@@ -61,7 +61,8 @@ pub fn irradiance(
 struct LightSample {
     /// From the receiver to that place, metres.
     offset: Vec3,
-    irradiance: Rgb,
+    /// W/m².
+    irradiance: DVec3,
 }
 
 /// Whether something stands between the receiver, lifted off its surface, and a place of a light.
@@ -101,8 +102,10 @@ fn sample(light: &Light, r: &Receiver, scene_radius: f32, u: f32, v: f32) -> Opt
         }
         Light::Directional { direction, irradiance, .. } => {
             let cos = -direction.dot(r.normal);
-            (cos > 0.0)
-                .then(|| LightSample { offset: -*direction * (4.0 * scene_radius), irradiance: *irradiance * cos })
+            (cos > 0.0).then(|| LightSample {
+                offset: -*direction * (4.0 * scene_radius),
+                irradiance: irradiance.as_dvec3() * f64::from(cos),
+            })
         }
         Light::Sphere { center, radius, power } => sphere(r, *center, *radius, *power, u, v),
         Light::Quad { center, u: eu, v: ev, power } => {
@@ -126,8 +129,9 @@ fn towards(r: &Receiver, position: Vec3, intensity: impl Fn(Vec3) -> Rgb) -> Opt
     if !(cos > 0.0 && distance.is_finite()) {
         return None;
     }
-    let intensity = intensity(w);
-    (intensity != Rgb::ZERO).then(|| LightSample { offset, irradiance: intensity * (cos / (distance * distance)) })
+    let (intensity, d) = (intensity(w), f64::from(distance));
+    (intensity != Rgb::ZERO)
+        .then(|| LightSample { offset, irradiance: intensity.as_dvec3() * (f64::from(cos) / (d * d)) })
 }
 
 /// One point of a surface that stands for all of it; `radiance_area` is radiance times area.
@@ -163,7 +167,7 @@ fn sphere(r: &Receiver, center: Vec3, radius: f32, power: Rgb, u: f32, v: f32) -
     let distance = d2.sqrt() * cos - (r2 - d2 * sin * sin).max(0.0).sqrt();
     // L Ω cos θ = Φ/(4π² r²) · 2π (1 - cos θ_max) cos θ.
     let scale = lit / (2.0 * std::f64::consts::PI * d2 * (1.0 + (1.0 - sin2).sqrt()));
-    Some(LightSample { offset: (w * distance).as_vec3(), irradiance: (power.as_dvec3() * scale).as_vec3() })
+    Some(LightSample { offset: (w * distance).as_vec3(), irradiance: power.as_dvec3() * scale })
 }
 
 #[cfg(test)]
@@ -180,7 +184,7 @@ mod tests {
         let intersector = Intersector::new(&scene.geometry, scene.radius);
         let receiver = Receiver { position, normal: Vec3::Y, found_along: Vec3::NEG_Y };
         let sequence = Sequence::new(Sampling::Sobol, 1);
-        irradiance(&scene, &intersector, &receiver, rays, &sequence, 0).x
+        irradiance(&scene, &intersector, &receiver, rays, &sequence, 0).x as f32
     }
 
     /// Each kind of light against its closed form.

@@ -261,7 +261,7 @@ impl Exact {
 fn light_of_photons(view: &ViewPass, slot: &Slot, rect: Rect, scratch: &mut Scratch) -> Vec<Rgb> {
     let rays = slot.estimator.rays_per_axis();
     let mut base = view.trace(rect, rays, scratch, &mut ViewCounts::default(), &mut Unrecorded);
-    base.fill(Rgb::ZERO);
+    base.fill(DVec3::ZERO);
     view.estimate(&base, rays, slot, scratch).pixels
 }
 

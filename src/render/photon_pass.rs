@@ -1,7 +1,7 @@
 //! The photon pass: all photons of one pass, and the maps made of them.
 
 use crate::math::hash::mix;
-use crate::math::rgb::Rgb;
+use crate::math::rgb::{Rgb, mean};
 use crate::math::sequence::{Sampling, Sequence};
 use crate::photons::emission::{Emission, LightShare, emit, share_photons};
 use crate::photons::map::{FootprintLimits, MapParts};
@@ -43,6 +43,8 @@ pub struct PhotonPass {
     pub emitted: u64,
     /// What was bounded.
     pub counts: PathCounts,
+    /// Power of the photons whose paths the bounce limit ended, the mean of the channels, W.
+    pub cut_off: f64,
     /// Photons of each kind that each chunk of emission stored, in the order of [`PhotonKind::ALL`].
     pub chunks: Vec<[u32; 3]>,
 }
@@ -71,6 +73,7 @@ impl Emitter<'_> {
             whole.stored.append(&mut part.stored);
             whole.emitted += part.emitted;
             whole.counts += part.counts;
+            whole.cut_off += part.cut_off;
         }
         whole
     }
@@ -187,7 +190,8 @@ impl<'a> Departures<'a> {
         part.emitted += 1;
         if self.aim.is_none_or(|a| a.may_meet(emission.origin, emission.direction)) {
             let (out, counts) = (&mut part.stored, &mut part.counts);
-            flight.trace(number, &emission, share.power, share.count, out, counts, recorder);
+            let left = flight.trace(number, &emission, share.power, share.count, out, counts, recorder);
+            part.cut_off += f64::from(mean(left));
         }
         emission
     }

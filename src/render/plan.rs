@@ -12,6 +12,9 @@ use serde::Serialize;
 
 /// Photons that the plan sends ahead to see where light goes.
 pub const PILOT_PHOTONS: u64 = 65_536;
+/// Surfaces that a pilot photon meets at most: where nothing absorbs, a high bounce limit would keep it on its way, and
+/// in memory, for long after it has shown what there is.
+const PILOT_DEPTH: u32 = 64;
 
 /// One part of a render.
 #[derive(Clone, Debug, Serialize)]
@@ -258,7 +261,7 @@ impl Pilot {
     /// Sends [`PILOT_PHOTONS`], which carry no differentials.
     pub fn send(scene: &Scene, intersector: &Intersector, settings: &RenderSettings) -> Self {
         let path = PathSettings {
-            max_depth: settings.max_depth,
+            max_depth: settings.max_depth.min(PILOT_DEPTH),
             direct: false,
             caustic: true,
             global: true,

@@ -353,6 +353,8 @@ impl Renderer {
     /// Adds up what the estimators `now` cost.
     fn record(&mut self, pass: &Pass, now: &[usize], result: &ViewResult, photon_seconds: f64) {
         self.bounded.views += result.counts.bounded;
+        self.bounded.radiance += result.beyond;
+        self.bounded.disc_floor += result.floored;
         self.inside_glass += result.counts.camera_inside_glass;
         self.seconds.view_trace += result.view_trace;
         for (slot, &i) in now.iter().enumerate() {
@@ -381,6 +383,7 @@ impl Renderer {
         let (floor, ceiling) = pass.maps.limited();
         self.bounded.footprint_floor += floor;
         self.bounded.footprint_ceiling += ceiling;
+        self.bounded.cut_off_power += (photons.cut_off - self.bounded.cut_off_power) / f64::from(self.counted);
     }
 
     /// What traces photons under `plan` and `settings`, which may ask for another number of photons.

@@ -58,7 +58,7 @@ pub struct StoredCounts {
 }
 
 /// Counts of values that were limited, so that nothing is limited in silence.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Bounded {
     /// Photon paths.
     pub photons: PathCounts,
@@ -68,6 +68,50 @@ pub struct Bounded {
     pub footprint_floor: u64,
     /// Photon footprints lowered to the scene's radius.
     pub footprint_ceiling: u64,
+    /// Discs of density estimation raised to the resolution of f32, because their photons lie in one point.
+    pub disc_floor: u64,
+    /// Pixels of a pass with a channel beyond f32, which hold its largest number there.
+    pub radiance: u64,
+    /// Power of the photons whose paths the bounce limit ended, W: the mean over the passes and channels.
+    pub cut_off_power: f64,
+}
+
+impl Bounded {
+    /// What was limited at all: how often, what, and what was done to it.
+    pub fn notes(&self) -> Vec<(u64, String, &'static str)> {
+        let paths = |of: &str, counts: &PathCounts| {
+            let PathCounts { differentials, grazing, horizon, normals, depth } = *counts;
+            [
+                (
+                    differentials,
+                    format!("{of} differentials"),
+                    "shortened to the scene's radius or to a linear range of directions",
+                ),
+                (grazing, format!("{of} solid angles"), "bounded at grazing directions"),
+                (horizon, format!("{of} shading normals"), "beyond the horizon; the flat normal took their place"),
+                (normals, format!("{of} shading normals"), "of no length; the flat normal took their place"),
+                (depth, format!("{of} paths"), "ended by the bounce limit"),
+            ]
+        };
+        let own = [
+            (self.footprint_floor, "photon footprints".to_owned(), "raised to the resolution of f32"),
+            (self.footprint_ceiling, "photon footprints".to_owned(), "lowered to the scene's radius"),
+            (self.disc_floor, "discs of density estimation".to_owned(), "raised to the resolution of f32"),
+            (self.radiance, "pixels".to_owned(), "beyond f32; they hold its largest number"),
+        ];
+        let all = paths("photon", &self.photons).into_iter().chain(paths("view", &self.views)).chain(own);
+        all.filter(|(count, ..)| *count > 0).collect()
+    }
+
+    /// The notes as one line each.
+    pub fn lines(&self) -> Vec<String> {
+        let mut lines: Vec<String> =
+            self.notes().iter().map(|(count, what, how)| format!("bounded: {count} {what} {how}")).collect();
+        if self.cut_off_power > 0.0 {
+            lines.push(format!("bounded: photons of {:.4e} W a pass ended by the bounce limit", self.cut_off_power));
+        }
+        lines
+    }
 }
 
 /// Largest resident memory of this process so far, bytes; None where the system does not say.
@@ -81,6 +125,17 @@ pub fn peak_rss_bytes() -> Option<u64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_was_bounded_is_said_and_nothing_else() {
+        assert!(Bounded::default().lines().is_empty());
+        let views = PathCounts { horizon: 3, ..Default::default() };
+        let bounded = Bounded { views, radiance: 2, cut_off_power: 1.5, ..Default::default() };
+        let lines = bounded.lines();
+        assert_eq!(lines.len(), 3);
+        assert!(lines[0].starts_with("bounded: 3 view shading normals beyond the horizon"), "{}", lines[0]);
+        assert!(lines[1].starts_with("bounded: 2 pixels beyond f32") && lines[2].contains("1.5000e0 W"));
+    }
 
     #[test]
     fn the_parts_make_the_whole() {

@@ -1,7 +1,7 @@
 //! View paths: from the camera, by specular surfaces, to the diffuse surfaces where radiance is estimated.
 
 use crate::estimate::{Estimator, View};
-use crate::math::rgb::{Rgb, mean};
+use crate::math::rgb::{Rgb, in_f32, mean};
 use crate::math::sequence::Sequence;
 use crate::photons::map::Query;
 use crate::photons::path::{MAX_ANGLE, PathCounts, attenuation, medium_before, medium_behind};
@@ -11,7 +11,7 @@ use crate::render::settings::RenderSettings;
 use crate::scene::{Material, Scene};
 use crate::trace::scatter::{SpecularRay, reflected, refracted, specular_weights};
 use crate::trace::{Differential, Intersector, Ray, Surface};
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use std::f32::consts::FRAC_1_PI;
 
 /// A diffuse surface at the end of a view path.
@@ -132,8 +132,8 @@ impl ViewTracer<'_> {
         stack: &mut Vec<Branch>,
         counts: &mut ViewCounts,
         recorder: &mut impl ViewRecorder,
-    ) -> Rgb {
-        let mut radiance = Rgb::ZERO;
+    ) -> DVec3 {
+        let mut radiance = DVec3::ZERO;
         stack.clear();
         stack.push(Branch { ray, differential, throughput: Rgb::ONE, medium: None, depth: 0, specular: 0 });
         while let Some(mut branch) = stack.pop() {
@@ -152,11 +152,11 @@ impl ViewTracer<'_> {
                 branch.throughput *= inside;
             }
             let material = &self.scene.materials[surface.material as usize];
-            let (mut light, mut made_hit) = (Rgb::ZERO, false);
+            let (mut light, mut made_hit) = (DVec3::ZERO, false);
             match material {
                 Material::Emitter { radiance: emitted } => {
                     if surface.front && self.plan.emission {
-                        light = branch.throughput * *emitted;
+                        light = (branch.throughput * *emitted).as_dvec3();
                         radiance += light;
                     }
                 }
@@ -164,7 +164,7 @@ impl ViewTracer<'_> {
                     let weight = branch.throughput * material.diffuse_reflectance(surface.uv) * FRAC_1_PI;
                     if self.plan.shadow_rays {
                         let receiver = Receiver { position: surface.position, normal: surface.normal, found_along: v };
-                        light = weight
+                        light = weight.as_dvec3()
                             * direct::irradiance(
                                 self.scene,
                                 self.intersector,
@@ -206,7 +206,7 @@ impl ViewTracer<'_> {
                 footprint: branch.differential.dp,
                 throughput: branch.throughput,
                 depth: branch.depth,
-                light,
+                light: in_f32(light).0,
                 hit: made_hit.then(|| hits.len() - 1),
             });
         }

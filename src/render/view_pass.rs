@@ -2,7 +2,7 @@
 
 use crate::estimate::{Gathered, Lookup};
 use crate::math::hash::mix;
-use crate::math::rgb::Rgb;
+use crate::math::rgb::{Rgb, in_f32};
 use crate::math::sequence::{Sampling, Sequence};
 use crate::photons::kd_tree::Nearest;
 use crate::photons::{PhotonKind, PhotonMap};
@@ -52,6 +52,10 @@ pub struct TileImage {
     pub seconds: PartSeconds,
     /// Photons looked at, for all hits.
     pub gathered: u64,
+    /// Pixels with a channel beyond f32, which hold its largest number there.
+    pub beyond: u64,
+    /// Discs of density estimation that were raised to the resolution of f32.
+    pub floored: u64,
 }
 
 /// A finished tile.
@@ -94,6 +98,10 @@ pub struct ViewResult {
     pub wall: f64,
     /// Photons looked at by each slot.
     pub gathered: Vec<u64>,
+    /// Pixels of all slots with a channel beyond f32.
+    pub beyond: u64,
+    /// Discs of all slots that were raised to the resolution of f32.
+    pub floored: u64,
     /// Counts of all view paths.
     pub counts: ViewCounts,
     /// Whether all tiles are there.
@@ -187,6 +195,7 @@ impl ViewPass<'_> {
         let scale = if spent > 0.0 { wall / spent } else { 0.0 };
         let mut seconds = vec![PartSeconds::default(); slots.len()];
         let mut gathered = vec![0; slots.len()];
+        let (mut beyond, mut floored) = (0, 0);
         let mut counts = ViewCounts::default();
         for tile in &tiles {
             counts.bounded += tile.counts.bounded;
@@ -194,9 +203,11 @@ impl ViewPass<'_> {
             for (i, image) in tile.images.iter().enumerate() {
                 seconds[i].add(&image.seconds, scale);
                 gathered[i] += image.gathered;
+                beyond += image.beyond;
+                floored += image.floored;
             }
         }
-        ViewResult { view_trace: view_trace * scale, tiles, seconds, wall, gathered, counts, complete }
+        ViewResult { view_trace: view_trace * scale, tiles, seconds, wall, gathered, beyond, floored, counts, complete }
     }
 
     /// One tile, whose place among the others is `number`; None if cancelled. Slots take turns at being first, so that none always finds the caches cold.
@@ -250,7 +261,7 @@ impl ViewPass<'_> {
         scratch: &mut Scratch,
         counts: &mut ViewCounts,
         recorder: &mut impl ViewRecorder,
-    ) -> Vec<Rgb> {
+    ) -> Vec<DVec3> {
         let t = &self.tracer;
         let camera = &t.scene.camera;
         let size = t.settings.size;
@@ -258,7 +269,7 @@ impl ViewPass<'_> {
         // unbiased sample of the box-filtered pixel, and edges of surfaces are resolved in the end.
         let cells = cells_of_pass(self.pass) as f32;
         let half = 0.5 / (n as f32 * cells);
-        let mut base = vec![Rgb::ZERO; (rect.width * rect.height) as usize];
+        let mut base = vec![DVec3::ZERO; (rect.width * rect.height) as usize];
         scratch.hits.clear();
         for (pixel, sum) in base.iter_mut().enumerate() {
             let x = rect.x + pixel as u32 % rect.width;
@@ -302,10 +313,10 @@ impl ViewPass<'_> {
 
     /// Gathers and estimates for the scratch's hits in batches, each part of a batch timed as a whole. A tile is one
     /// batch unless photons overlap by the thousand, so that memory stays bounded.
-    pub(super) fn estimate(&self, base: &[Rgb], n: u32, slot: &Slot, scratch: &mut Scratch) -> TileImage {
-        let mut sums: Vec<DVec3> = base.iter().map(|b| b.as_dvec3()).collect();
+    pub(super) fn estimate(&self, base: &[DVec3], n: u32, slot: &Slot, scratch: &mut Scratch) -> TileImage {
+        let mut sums = base.to_vec();
         let mut seconds = PartSeconds::default();
-        let mut gathered = 0;
+        let (mut gathered, mut floored) = (0, 0);
         let mut next = 0;
         while next < scratch.hits.len() {
             let start = Instant::now();
@@ -316,6 +327,7 @@ impl ViewPass<'_> {
                 for map in self.maps.all() {
                     let from = scratch.indices.len();
                     let radius = self.gather(map, slot, next, scratch);
+                    floored += u64::from(radius > 0.0 && radius <= self.tracer.scene.resolution());
                     scratch.spans.push((from, scratch.indices.len(), radius));
                 }
                 next += 1;
@@ -326,18 +338,26 @@ impl ViewPass<'_> {
             let start = Instant::now();
             let mut spans = scratch.spans.iter();
             for hit in &scratch.hits[first..next] {
-                let mut irradiance = Rgb::ZERO;
+                let mut irradiance = DVec3::ZERO;
                 for (map, &(from, to, radius)) in self.maps.all().zip(spans.by_ref()) {
                     let found = Gathered { photons: map.photons(), indices: &scratch.indices[from..to], radius };
                     irradiance += slot.estimator.irradiance(&found, &hit.seen_by(slot.estimator));
                 }
-                sums[hit.pixel as usize] += irradiance.as_dvec3() * hit.weight.as_dvec3();
+                sums[hit.pixel as usize] += irradiance * hit.weight.as_dvec3();
             }
             seconds.estimate += start.elapsed().as_secs_f64();
         }
         let scale = 1.0 / f64::from(n * n);
-        let pixels = sums.into_iter().map(|s| finite(s * scale)).collect();
-        TileImage { pixels, seconds, gathered }
+        let mut beyond = 0;
+        let pixels = sums
+            .into_iter()
+            .map(|s| {
+                let (pixel, bounded) = in_f32(s * scale);
+                beyond += u64::from(bounded);
+                pixel
+            })
+            .collect();
+        TileImage { pixels, seconds, gathered, beyond, floored }
     }
 
     /// Traces and gathers for a tile as [`ViewPass::run`] does, and keeps what was found: four bytes for each photon of
@@ -416,11 +436,6 @@ pub(super) fn cells_of_pass(pass: u32) -> u32 {
 /// on, so that in the end the curvature of its outline does not count.
 fn parts_of_pass(pass: u32) -> u32 {
     cells_of_pass(pass / 256)
-}
-
-/// Sums beyond f32 become its largest number, so that no infinity reaches an image.
-fn finite(sum: DVec3) -> Rgb {
-    sum.clamp(DVec3::ZERO, DVec3::splat(f64::from(f32::MAX))).as_vec3()
 }
 
 #[cfg(test)]

@@ -2,7 +2,6 @@
 
 use crate::estimate::multi_sampled::MultiSampled;
 use crate::estimate::{Estimator, Gathered, Lookup, View};
-use crate::math::rgb::Rgb;
 use crate::photons::{MapPhoton, PhotonMap};
 use glam::{DVec3, Vec3};
 
@@ -50,7 +49,7 @@ impl Estimator for CarriedWeight {
         self.inner.weight(photon, view, radius)
     }
 
-    fn irradiance(&self, gathered: &Gathered, view: &View) -> Rgb {
+    fn irradiance(&self, gathered: &Gathered, view: &View) -> DVec3 {
         let points = f64::from(self.n * self.n);
         let mut sum = DVec3::ZERO;
         let mut w = 0.0;
@@ -60,7 +59,7 @@ impl Estimator for CarriedWeight {
             w = w / points + self.mean(photon, view);
             sum += photon.power.as_dvec3() * (3.0 * w * f64::from(photon.inverse_area));
         }
-        sum.min(DVec3::splat(f64::from(f32::MAX))).as_vec3()
+        sum
     }
 }
 
@@ -103,7 +102,7 @@ impl Estimator for ListedRadius {
         self.inner.weight(photon, view, radius)
     }
 
-    fn irradiance(&self, gathered: &Gathered, view: &View) -> Rgb {
+    fn irradiance(&self, gathered: &Gathered, view: &View) -> DVec3 {
         let [a, b] = view.query.axes.map(Vec3::length_squared);
         let within = a.max(b) + self.longest;
         let near = |i: &&u32| gathered.photons[**i as usize].position.distance_squared(view.query.center) <= within;
@@ -117,6 +116,7 @@ mod tests {
     use super::*;
     use crate::estimate::integrated::Integrated;
     use crate::estimate::multi_sampled::Grid;
+    use crate::math::rgb::Rgb;
     use crate::photons::Photon;
     use crate::photons::map::{FootprintLimits, MapParts, Query};
 

@@ -9,6 +9,10 @@ mod scenes;
 mod chains;
 mod clipping;
 mod differentials;
+mod footprints;
+mod passes;
+mod powers;
+mod setup;
 mod units;
 mod watertight;
 
@@ -16,5 +20,15 @@ pub use case::{Case, Judged, Outcome, Verdict};
 
 /// All cases of this module, group by group.
 pub fn cases() -> Vec<Case> {
-    [clipping::CASES, differentials::CASES, watertight::CASES, units::CASES, chains::CASES].concat()
+    [
+        footprints::CASES,
+        clipping::CASES,
+        differentials::CASES,
+        chains::CASES,
+        watertight::CASES,
+        units::CASES,
+        powers::CASES,
+        passes::CASES,
+    ]
+    .concat()
 }

@@ -11,7 +11,7 @@ pub use photon_path::{PhotonPath, PhotonVertex, photon_path};
 pub use situation::Situation;
 
 use crate::estimate::{Estimator, View};
-use crate::math::rgb::Rgb;
+use crate::math::rgb::{Rgb, in_f32};
 use crate::photons::map::Query;
 use crate::photons::{MapPhoton, PhotonKind};
 use crate::render::film::Rect;
@@ -21,7 +21,7 @@ use crate::render::renderer::slots;
 use crate::render::view::{ViewCounts, ViewTracer, seen_by};
 use crate::render::view_pass::{Scratch, ViewPass};
 use crate::render::watch::Silent;
-use glam::{DVec3, Vec3};
+use glam::Vec3;
 use path::PathRecorder;
 use std::collections::BTreeMap;
 
@@ -217,7 +217,7 @@ impl Inspection {
     pub fn sum(&self, estimator: usize) -> Rgb {
         let base = self.estimators.get(estimator).map_or(Rgb::ZERO, |e| e.base);
         let photons = self.rows.iter().filter_map(|r| r.contributions.get(estimator));
-        bounded(photons.fold(base.as_dvec3(), |sum, c| sum + c.as_dvec3()))
+        in_f32(photons.fold(base.as_dvec3(), |sum, c| sum + c.as_dvec3())).0
     }
 }
 
@@ -277,7 +277,7 @@ impl Account<'_> {
                 }
             });
         }
-        bounded(base.first().copied().unwrap_or_default().as_dvec3() / f64::from(n * n))
+        in_f32(base.first().copied().unwrap_or_default() / f64::from(n * n)).0
     }
 
     fn rows(&mut self) -> Vec<PhotonRow> {
@@ -311,14 +311,9 @@ impl Account<'_> {
             distance: photon.to_filter(query.center - photon.position).length(),
             condition: photon.condition(),
             situation: Situation::of(photon, query),
-            contributions: weights.iter().map(|w| bounded(light * *w)).collect(),
+            contributions: weights.iter().map(|w| in_f32(light * *w).0).collect(),
             samples: samples.collect(),
             weights,
         }
     }
-}
-
-/// In f32, sums beyond it at its largest number, as in images.
-fn bounded(sum: DVec3) -> Rgb {
-    sum.min(DVec3::splat(f64::from(f32::MAX))).as_vec3()
 }

@@ -64,6 +64,7 @@ mod tests {
             position: Vec3::ZERO,
             inverse_area: t.inverse_area,
             rows: t.rows,
+            turn: t.turn,
             reach: t.reach,
             power: Rgb::ONE,
             normal: Vec3::Y,

@@ -44,4 +44,11 @@ pub(super) fn show(panes: &mut Panes, ui: &mut Ui) {
         let peak = crate::render::stats::peak_rss_bytes().filter(|_| !panes.desk.untimed);
         fact(ui, "Peak memory", peak.map_or("-".into(), |b| mib(b as usize)));
     });
+    let lines = p.bounded.lines();
+    if !lines.is_empty() {
+        ui.separator();
+        lines.iter().for_each(|line| {
+            ui.label(line);
+        });
+    }
 }
