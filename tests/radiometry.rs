@@ -206,7 +206,7 @@ fn light_leaves_a_medium_by_its_index_squared() {
             ..Default::default()
         };
         let got = middle(scene, &flags, 1);
-        let through = 1.0 - cusp::trace::scatter::fresnel(1.0, 1.0 / 1.5);
+        let through = 1.0 - cusp::trace::scatter::fresnel(1.0, 1.0 / 1.5) as f32;
         let expected = 10.0 * through * 0.5 / PI * through / 2.25 * ways;
         assert!((got / expected - 1.0).abs() < 0.02, "tint {tint}: {got} {expected}");
     }

@@ -115,7 +115,8 @@ fn aimed_at_the_ball(scene: &mut Scene) {
     let cos_half = (1.0 - sine * sine).sqrt();
     let fraction = (1.0 - cos_half) / 2.0;
     let direction = way.normalize();
-    scene.lights = vec![Light::Spot { position, direction, cos_half, falloff: 0.0, power: power * fraction }];
+    scene.lights =
+        vec![Light::Spot { position, direction, cos_half: f64::from(cos_half), falloff: 0.0, power: power * fraction }];
 }
 
 /// The focus holds an eighth of the light on a few pixels, and the region of stray light very little: the three parts of

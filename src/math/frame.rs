@@ -6,9 +6,10 @@ use std::f32::consts::{PI, TAU};
 
 /// Two unit vectors that make a right-handed frame with the unit vector `n`: `(t, b)` with `t × b = n`.
 ///
-/// Continuous except at `n.z = 0` (Duff et al. 2017).
+/// Continuous except at a `n.z` just below 0 (Duff et al. 2017). Not at 0 itself: there walls along the axes have their
+/// normals, and rounding must not turn their frames.
 pub fn tangents(n: Vec3) -> (Vec3, Vec3) {
-    let sign = 1.0_f32.copysign(n.z);
+    let sign = if n.z < -1e-5 { -1.0 } else { 1.0 };
     let a = -1.0 / (sign + n.z);
     let b = n.x * n.y * a;
     (Vec3::new(1.0 + sign * n.x * n.x * a, sign * b, -sign * n.x), Vec3::new(b, sign + n.y * n.y * a, -n.y))
@@ -71,6 +72,17 @@ mod tests {
             prop_assert!((t.length() - 1.0).abs() < 1e-5 && (b.length() - 1.0).abs() < 1e-5);
             prop_assert!(t.dot(n).abs() < 1e-5 && b.dot(n).abs() < 1e-5 && t.dot(b).abs() < 1e-5);
             prop_assert!((t.cross(b) - n).length() < 1e-5);
+        }
+    }
+
+    #[test]
+    fn walls_along_the_axes_keep_their_frames_under_rounding() {
+        for n in [Vec3::X, Vec3::Y, Vec3::NEG_X, Vec3::NEG_Y] {
+            let (t, b) = tangents(n);
+            for z in [-0.0, 1e-7, -1e-7, 1e-40, -1e-40] {
+                let (u, v) = tangents(Vec3::new(n.x, n.y, z));
+                assert!((t - u).length() < 1e-6 && (b - v).length() < 1e-6);
+            }
         }
     }
 

@@ -1,14 +1,13 @@
 //! Emission: how many photons each light sends out, and how each of them starts.
 
-use crate::math::elementary::pow;
-use crate::math::frame::{concentric_disc, cosine_hemisphere, direction, tangents, uniform_sphere, unit};
+use crate::math::frame::{concentric_disc, cosine_hemisphere, tangents, uniform_sphere};
 use crate::math::rgb::{Rgb, mean};
 use crate::math::sequence::Sequence;
 use crate::scene::{Light, Scene};
 use crate::trace::Differential;
-use crate::trace::surface::SELF_INTERSECTION;
+use crate::trace::surface::{SELF_INTERSECTION, flat_normal};
 use glam::Vec3;
-use std::f32::consts::{PI, TAU};
+use std::f32::consts::PI;
 
 /// Cosine below which the solid angle `π/(N cos θ)` of an area light's or diffuse surface's photon grows no more.
 pub const GRAZING_COSINE: f32 = 0.01;
@@ -86,9 +85,10 @@ pub fn emit(scene: &Scene, light: &Light, count: u64, x: [f32; 4]) -> Emission {
     match light {
         Light::Point { position, .. } => from_point(*position, uniform_sphere(x[0], x[1]).normalize(), 4.0 * PI / n),
         Light::Spot { position, direction: axis, cos_half, falloff, .. } => {
+            let (below, density) = spot_cosine(*cos_half, f64::from(*falloff), f64::from(x[0]));
             let whole = Light::spot_normalization(*cos_half, *falloff);
-            let (cos, density) = spot_cosine(*cos_half, *falloff, whole, x[0]);
-            from_point(*position, direction(*axis, cos, TAU * x[1]), 1.0 / (n * density))
+            let solid_angle = (whole / (count as f64 * density)) as f32;
+            from_point(*position, near_axis(*axis, below, f64::from(x[1])), solid_angle)
         }
         Light::Sphere { center, radius, .. } => {
             let normal = uniform_sphere(x[0], x[1]).normalize();
@@ -116,11 +116,6 @@ pub fn emit(scene: &Scene, light: &Light, count: u64, x: [f32; 4]) -> Emission {
     }
 }
 
-/// Unit normal of the front of a parallelogram; in f64, where the cross product of short or long edges keeps its length.
-pub fn quad_normal(u: Vec3, v: Vec3) -> Vec3 {
-    unit(u.as_dvec3().cross(v.as_dvec3())).map_or(Vec3::Y, |n| n.as_vec3())
-}
-
 /// Solid angle that one of `n` cosine-weighted photons owns, `π/(n cos θ)`, and whether it was bounded.
 pub fn cosine_solid_angle(n: f32, cos: f32) -> (f32, bool) {
     (PI / (n * cos.max(GRAZING_COSINE)), cos < GRAZING_COSINE)
@@ -137,14 +132,30 @@ fn cone_differential(direction: Vec3, solid_angle: f32) -> Differential {
     Differential { dp: [Vec3::ZERO; 2], dv: [t * r, b * r] }
 }
 
-/// Cosine to a spot's axis for a number in `[0, 1)`, and the density over solid angle there.
-fn spot_cosine(cos_half: f32, falloff: f32, whole: f32, u: f32) -> (f32, f32) {
+/// What the cosine to a spot's axis lacks of 1 for a number in `[0, 1)`, and the intensity there over that on the axis.
+fn spot_cosine(cos_half: f64, falloff: f64, u: f64) -> (f64, f64) {
     if falloff == 0.0 {
-        return (1.0 - u * (1.0 - cos_half), 1.0 / whole);
+        return (u * (1.0 - cos_half), 1.0);
     }
-    let edge = pow(cos_half.max(0.0), falloff + 1.0);
-    let cos = pow(1.0 - u * (1.0 - edge), 1.0 / (falloff + 1.0));
-    (cos, (pow(cos, falloff) / whole).max(f32::MIN_POSITIVE / f32::EPSILON))
+    let edge = libm::pow(cos_half.max(0.0), falloff + 1.0);
+    // cos^(falloff + 1) by its logarithm, which keeps the digits that a cosine near 1 has not.
+    let log = libm::log1p(-u * (1.0 - edge)) / (falloff + 1.0);
+    // The rim of a lobe that ends at the horizon has no intensity, and its photons no end of solid angle.
+    (-libm::expm1(log), libm::exp(falloff * log).max(1e-30))
+}
+
+/// Unit direction whose cosine to the unit vector `axis` is `below` less than 1, at `turn` of a full turn about it.
+fn near_axis(axis: Vec3, below: f64, turn: f64) -> Vec3 {
+    let (t, b) = tangents(axis);
+    let (s, c) = libm::sincos(std::f64::consts::TAU * turn);
+    let sin = (below * (2.0 - below)).max(0.0).sqrt();
+    let across = t.as_dvec3() * c + b.as_dvec3() * s;
+    (axis.as_dvec3() * (1.0 - below) + across * sin).normalize().as_vec3()
+}
+
+/// Unit normal of a parallelogram with half-edges `u`, `v`, whose product may be too small for f32.
+pub fn quad_normal(u: Vec3, v: Vec3) -> Vec3 {
+    flat_normal([Vec3::ZERO, u, v]).as_vec3()
 }
 
 /// Uniform point on triangles: position and unit normal of the front side.
@@ -159,7 +170,7 @@ pub fn sample_triangles(triangles: &[[Vec3; 3]], cumulative: &[f32], u: f32, v: 
     let [a, b, c] = triangles[i];
     let root = u.sqrt();
     let position = a * (1.0 - root) + b * (root * (1.0 - v)) + c * (root * v);
-    (position, quad_normal(b - a, c - a))
+    (position, flat_normal([a, b, c]).as_vec3())
 }
 
 #[cfg(test)]
@@ -219,11 +230,11 @@ mod tests {
                 Light::Spot {
                     position: Vec3::Y,
                     direction: Vec3::NEG_Y,
-                    cos_half: cone.cos(),
+                    cos_half: f64::from(cone).cos(),
                     falloff: 0.0,
                     power: Rgb::ONE,
                 },
-                TAU * (1.0 - cone.cos()),
+                2.0 * PI * (1.0 - cone.cos()),
             ),
         ];
         let sequence = Sequence::new(Sampling::Sobol, 1);
@@ -264,7 +275,7 @@ mod tests {
             let light = Light::Spot {
                 position: Vec3::Y,
                 direction: Vec3::NEG_Y,
-                cos_half: half.cos(),
+                cos_half: f64::from(half).cos(),
                 falloff,
                 power: Rgb::ONE,
             };

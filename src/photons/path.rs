@@ -1,6 +1,5 @@
 //! A photon's path from its light to its end, and what is stored on the way.
 
-use crate::math::elementary::pow;
 use crate::math::frame::cosine_hemisphere;
 use crate::math::rgb::{Rgb, mean};
 use crate::math::sequence::Sequence;
@@ -8,7 +7,7 @@ use crate::photons::emission::Emission;
 use crate::photons::spread::{self, DiffuseSpread};
 use crate::photons::{Photon, PhotonKind, StoredPhotons};
 use crate::scene::{Material, Scene};
-use crate::trace::scatter::{reflected, refracted, specular_weights};
+use crate::trace::scatter::{SpecularRay, reflected, refracted, specular_weights};
 use crate::trace::{Differential, Intersector, Ray, Surface};
 use glam::Vec3;
 use serde::Serialize;
@@ -43,6 +42,8 @@ pub struct PathCounts {
     pub grazing: u64,
     /// Specular rays that a shading normal sent beyond the horizon.
     pub horizon: u64,
+    /// Specular rays from places where the normals of a triangle's corners cancel, so that its flat normal shades.
+    pub normals: u64,
     /// Paths ended by the bounce limit.
     pub depth: u64,
 }
@@ -52,6 +53,7 @@ impl AddAssign for PathCounts {
         self.differentials += o.differentials;
         self.grazing += o.grazing;
         self.horizon += o.horizon;
+        self.normals += o.normals;
         self.depth += o.depth;
     }
 }
@@ -209,14 +211,16 @@ impl Flight<'_> {
                     ray = Ray { origin: surface.leave(scene, w), direction: w };
                 }
                 _ => {
-                    let Some((next, kept, beyond, through)) =
-                        self.specular(material, &surface, &ray, power, &mut d, x[0])
-                    else {
+                    let Some((next, kept, through)) = self.specular(material, &surface, &ray, power, &d, x[0]) else {
                         return Rgb::ZERO;
                     };
                     power = kept;
-                    ray = next;
-                    counts.horizon += u64::from(beyond);
+                    ray = Ray { origin: next.origin, direction: next.direction };
+                    if self.settings.differentials {
+                        d = next.differential;
+                    }
+                    counts.horizon += u64::from(next.beyond_horizon);
+                    counts.normals += u64::from(next.without_shading);
                     if through {
                         medium = medium_behind(&surface);
                     }
@@ -238,17 +242,16 @@ impl Flight<'_> {
         }
     }
 
-    /// One specular event by roulette on `x`: the next ray, the power it keeps, whether its normal was mended, and
-    /// whether it went through.
+    /// One specular event by roulette on `x`: the next ray, the power it keeps, and whether it went through.
     fn specular(
         &self,
         material: &Material,
         surface: &Surface,
         ray: &Ray,
         power: Rgb,
-        d: &mut Differential,
+        d: &Differential,
         x: f32,
-    ) -> Option<(Ray, Rgb, bool, bool)> {
+    ) -> Option<(SpecularRay, Rgb, bool)> {
         let weights = specular_weights(material, surface, ray.direction)?;
         let reflect = share(power, weights.reflected);
         let refract = share(power, weights.refracted);
@@ -260,11 +263,7 @@ impl Flight<'_> {
         } else {
             return None;
         };
-        if self.settings.differentials {
-            *d = next.differential;
-        }
-        let ray = Ray { origin: surface.leave(self.scene, next.direction), direction: next.direction };
-        Some((ray, power * weight / q, next.beyond_horizon, through))
+        Some((next, power * weight / q, through))
     }
 }
 
@@ -283,8 +282,8 @@ pub fn medium_behind(surface: &Surface) -> Option<u32> {
 /// Transmittance of a way of `distance` metres in `medium`, if that absorbs.
 pub fn attenuation(scene: &Scene, medium: Option<u32>, distance: f32) -> Option<Rgb> {
     match scene.materials.get(medium? as usize) {
-        Some(Material::Dielectric { transmittance, .. }) if *transmittance != Rgb::ONE => {
-            Some(Rgb::from_array(transmittance.to_array().map(|t| pow(t, distance))))
+        Some(m @ Material::Dielectric { absorption, .. }) if *absorption != Rgb::ZERO => {
+            Some(m.transmittance(distance))
         }
         _ => None,
     }

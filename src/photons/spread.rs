@@ -52,18 +52,15 @@ fn turned(x: Vec3, v: Vec3, w: Vec3) -> Vec3 {
 ///
 /// For a 2×2 matrix M, `M ± cof M` is the polar factor up to a positive scale, with the sign of `det M`.
 fn polar_factor(dp: [Vec3; 2], w: Vec3) -> [Vec3; 2] {
+    // f64: the determinant of a footprint far below a metre vanishes in f32, and with it the sign.
     let (t, b) = tangents(w);
-    let m = [[t.dot(dp[0]), b.dot(dp[0])], [t.dot(dp[1]), b.dot(dp[1])]];
-    let sign = (m[0][0] * m[1][1] - m[0][1] * m[1][0] >= 0.0) as i8 as f32 * 2.0 - 1.0;
+    let (t, b) = (t.as_dvec3(), b.as_dvec3());
+    let m = dp.map(|c| [t.dot(c.as_dvec3()), b.dot(c.as_dvec3())]);
+    let sign = if m[0][0] * m[1][1] - m[0][1] * m[1][0] >= 0.0 { 1.0 } else { -1.0 };
     let (c, s) = (m[0][0] + sign * m[1][1], m[0][1] - sign * m[1][0]);
-    let scale = c.abs().max(s.abs());
-    if !(scale > 0.0 && scale.is_finite()) {
-        return [t, b];
-    }
-    let (c, s) = (c / scale, s / scale);
     let l = (c * c + s * s).sqrt();
-    let (c, s) = (c / l, s / l);
-    [t * c + b * s, (b * c - t * s) * sign]
+    let (c, s) = if l > 0.0 && l.is_finite() { (c / l, s / l) } else { (1.0, 0.0) };
+    [(t * c + b * s).as_vec3(), ((b * c - t * s) * sign).as_vec3()]
 }
 
 #[cfg(test)]
@@ -96,6 +93,16 @@ mod tests {
         let (out, bounded) = bounce(DiffuseSpread::Polar, &Differential::default(), Vec3::NEG_Y, Vec3::Y, 1.0, 100);
         assert!(!bounded);
         assert!((out.dv[0].length() - 0.1).abs() < 1e-6 && out.dv[0].dot(out.dv[1]).abs() < 1e-8);
+    }
+
+    /// A mirrored footprint stays mirrored whatever its size.
+    #[test]
+    fn small_footprints_keep_their_sense() {
+        for size in [1.0f32, 1e-12, 1e-24, 1e24] {
+            let d = Differential { dp: [Vec3::X * size, Vec3::Z * size], dv: [Vec3::ZERO; 2] };
+            let (out, _) = bounce(DiffuseSpread::Polar, &d, Vec3::NEG_Y, Vec3::Y, 1.0, 100);
+            assert!((out.dv[0] - Vec3::X * 0.1).length() < 1e-7 && (out.dv[1] - Vec3::Z * 0.1).length() < 1e-7);
+        }
     }
 
     #[test]

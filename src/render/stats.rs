@@ -80,7 +80,7 @@ impl Bounded {
     /// What was limited at all: how often, what, and what was done to it.
     pub fn notes(&self) -> Vec<(u64, String, &'static str)> {
         let paths = |of: &str, counts: &PathCounts| {
-            let PathCounts { differentials, grazing, horizon, depth } = *counts;
+            let PathCounts { differentials, grazing, horizon, normals, depth } = *counts;
             [
                 (
                     differentials,
@@ -89,6 +89,7 @@ impl Bounded {
                 ),
                 (grazing, format!("{of} solid angles"), "bounded at grazing directions"),
                 (horizon, format!("{of} shading normals"), "beyond the horizon; the flat normal took their place"),
+                (normals, format!("{of} shading normals"), "of no length; the flat normal took their place"),
                 (depth, format!("{of} paths"), "ended by the bounce limit"),
             ]
         };

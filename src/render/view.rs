@@ -167,7 +167,7 @@ impl ViewTracer<'_> {
                 Material::Diffuse { .. } => {
                     let weight = branch.throughput * material.diffuse_reflectance(surface.uv) * FRAC_1_PI;
                     if self.plan.shadow_rays {
-                        let receiver = Receiver { position: surface.position, normal: surface.normal };
+                        let receiver = Receiver { position: surface.position, normal: surface.normal, found_along: v };
                         light = weight.as_dvec3()
                             * direct::irradiance(
                                 self.scene,
@@ -241,10 +241,11 @@ impl ViewTracer<'_> {
         let bend = weights.eta * weights.eta;
         let mut follow = |next: SpecularRay, weight: Rgb, medium: Option<u32>| {
             counts.bounded.horizon += u64::from(next.beyond_horizon);
+            counts.bounded.normals += u64::from(next.without_shading);
             let throughput = branch.throughput * weight;
             if throughput != Rgb::ZERO {
                 stack.push(Branch {
-                    ray: Ray { origin: surface.leave(self.scene, next.direction), direction: next.direction },
+                    ray: Ray { origin: next.origin, direction: next.direction },
                     differential: next.differential,
                     throughput,
                     medium,

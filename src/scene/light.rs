@@ -2,7 +2,8 @@
 
 use crate::math::rgb::Rgb;
 use glam::Vec3;
-use std::f32::consts::{PI, TAU};
+use std::f32::consts::PI;
+use std::f64::consts::TAU;
 
 /// A light source, in local coordinates and metres.
 #[derive(Clone, Debug, PartialEq)]
@@ -40,8 +41,8 @@ pub enum Light {
         position: Vec3,
         /// Unit vector along the axis.
         direction: Vec3,
-        /// Cosine of half the cone's angle, below 1.
-        cos_half: f32,
+        /// Cosine of half the cone's angle, below 1; f64, because of a narrow cone it is the distance to 1 that counts.
+        cos_half: f64,
         /// Exponent, not negative; 0 is uniform.
         falloff: f32,
         /// Flux Φ, W.
@@ -76,7 +77,8 @@ impl Light {
         let mut cumulative_area = Vec::new();
         let mut sum = 0.0f64;
         for t in triangles {
-            let area = (t[1] - t[0]).as_dvec3().cross((t[2] - t[0]).as_dvec3()).length() / 2.0;
+            let [a, b, c] = t.map(|p| p.as_dvec3());
+            let area = (b - a).cross(c - a).length() / 2.0;
             if area > 0.0 {
                 sum += area;
                 kept.push(t);
@@ -110,12 +112,12 @@ impl Light {
     }
 
     /// Solid angle of a spot light's cone weighted by `cos^falloff`, sr: its on-axis intensity is Φ over this.
-    pub fn spot_normalization(cos_half: f32, falloff: f32) -> f32 {
+    pub fn spot_normalization(cos_half: f64, falloff: f32) -> f64 {
         let n = f64::from(falloff) + 1.0;
         // A cosine cannot be raised to a power below zero: the lobe ends at the horizon when it has a falloff.
-        let c = f64::from(cos_half).max(if falloff > 0.0 { 0.0 } else { -1.0 });
+        let c = cos_half.max(if falloff > 0.0 { 0.0 } else { -1.0 });
         let edge = if falloff > 0.0 { libm::pow(c, n) } else { c };
-        TAU * ((1.0 - edge) / n) as f32
+        TAU * (1.0 - edge) / n
     }
 
     /// Whether it is a surface.
@@ -152,12 +154,12 @@ mod tests {
 
     #[test]
     fn uniform_spot_spreads_over_its_solid_angle() {
-        let half = 0.4f32;
+        let half = 0.4f64;
         let omega = TAU * (1.0 - half.cos());
-        assert!((Light::spot_normalization(half.cos(), 0.0) - omega).abs() < 1e-5);
-        assert!((Light::spot_normalization(-1.0, 0.0) - 4.0 * PI).abs() < 1e-5);
+        assert!((Light::spot_normalization(half.cos(), 0.0) - omega).abs() < 1e-12);
+        assert!((Light::spot_normalization(-1.0, 0.0) - 2.0 * TAU).abs() < 1e-12);
         // ∫ cos θ over the hemisphere is π.
-        assert!((Light::spot_normalization(0.0, 1.0) - PI).abs() < 1e-5);
+        assert!((Light::spot_normalization(0.0, 1.0) - TAU / 2.0).abs() < 1e-12);
     }
 
     #[test]

@@ -29,8 +29,9 @@ pub enum Material {
     Dielectric {
         /// Refractive index against the outside, at least 1.
         ior: f32,
-        /// Transmittance per metre inside, per channel.
-        transmittance: Rgb,
+        /// Absorption coefficient inside, -ln of the transmittance per metre, per channel, 1/m. Not the transmittance
+        /// itself, whose digits vanish in f32 beside 1 or 0 where the scene's unit is far from a metre.
+        absorption: Rgb,
     },
     /// A light's surface: black to light that arrives, radiant on its front side.
     Emitter {
@@ -50,6 +51,17 @@ impl Material {
         matches!(self, Self::Diffuse { .. })
     }
 
+    /// Transmittance of a way of `distance` metres inside, per channel, in `[0, 1]`; 1 for other kinds.
+    pub fn transmittance(&self, distance: f32) -> Rgb {
+        match self {
+            Self::Dielectric { absorption, .. } => {
+                let over = |a: f32| libm::exp(-f64::from(a) * f64::from(distance)) as f32;
+                Rgb::new(over(absorption.x), over(absorption.y), over(absorption.z))
+            }
+            _ => Rgb::ONE,
+        }
+    }
+
     /// Diffuse reflectance at the texture coordinates `uv`; black for other kinds.
     pub fn diffuse_reflectance(&self, uv: Vec2) -> Rgb {
         match self {
@@ -59,5 +71,22 @@ impl Material {
             },
             _ => Rgb::ZERO,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Tinted glass in millimetres, kilometres and beyond lets the same through from side to side.
+    #[test]
+    fn tint_does_not_know_the_unit() {
+        for unit in [1e-9f64, 1e-3, 1.0, 1e3, 1e9] {
+            let absorption = Rgb::splat((-libm::log(0.75) * unit) as f32);
+            let through = Material::Dielectric { ior: 1.5, absorption }.transmittance((2.0 / unit) as f32);
+            assert!((through.x - 0.5625).abs() < 1e-6, "{unit}: {through}");
+        }
+        let black = Material::Dielectric { ior: 1.5, absorption: Rgb::splat(f32::MAX) };
+        assert_eq!((black.transmittance(0.0), black.transmittance(1e-3)), (Rgb::ONE, Rgb::ZERO));
     }
 }

@@ -4,10 +4,10 @@
 
 use glam::{DVec3, Vec3};
 
-/// Smallest |VᵀN| that transfer divides by; a ray closer to the plane is treated as if it met it at this cosine.
-pub const GRAZING: f64 = 1e-6;
-/// Smallest √ε that refraction divides by, so that the differential stays finite at total internal reflection.
-pub const CRITICAL: f64 = 1e-3;
+/// Smallest |VᵀN| and √ε that transfer and refraction divide by, far below what unit vectors in f32 can tell from 0.
+///
+/// It only keeps infinities away. What it leaves is far longer than [`Differential::bound`] allows, which counts it.
+const SMALLEST: f64 = 1e-30;
 
 /// How a ray's origin and direction change with its two parameters.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -20,46 +20,48 @@ pub struct Differential {
 
 impl Differential {
     /// Moves the origin along the unit direction `v` by `s` metres to a surface of unit normal `n`
-    /// (Pedersen 2011, eq. 26 corrected). `dv` stays.
+    /// (Pedersen 2011, eq. 26 corrected). `dv` stays. At grazing incidence as long as it is, never infinite.
     pub fn transfer(&self, v: Vec3, n: Vec3, s: f32) -> Self {
-        let (v, n) = (v.as_dvec3(), n.as_dvec3());
-        let column = |i: usize| transfer(v, n, f64::from(s), self.dp[i].as_dvec3(), self.dv[i].as_dvec3()).as_vec3();
+        let (v, n) = (unit(v), unit(n));
+        let column = |i: usize| stored(transfer(v, n, f64::from(s), self.dp[i].as_dvec3(), self.dv[i].as_dvec3()));
         Self { dp: [column(0), column(1)], dv: self.dv }
     }
 
     /// Reflects at unit normal `n` whose own change over the footprint is `dn` (Pedersen 2011, eq. 28 corrected).
     pub fn reflect(&self, v: Vec3, n: Vec3, dn: [Vec3; 2]) -> Self {
-        let (v, n) = (v.as_dvec3(), n.as_dvec3());
-        let column = |i: usize| reflect(v, n, dn[i].as_dvec3(), self.dv[i].as_dvec3()).as_vec3();
+        let (v, n) = (unit(v), unit(n));
+        let column = |i: usize| stored(reflect(v, n, dn[i].as_dvec3(), self.dv[i].as_dvec3()));
         Self { dp: self.dp, dv: [column(0), column(1)] }
     }
 
     /// Refracts at unit normal `n`, which faces the incident side, with `eta` the ratio of the indices n₁/n₂
-    /// (Pedersen 2011, eq. 35 corrected). Finite at the critical angle, where `1/√ε` is bounded.
+    /// (Pedersen 2011, eq. 35 corrected). At the critical angle, where `1/√ε` has its pole, as long as it is, never infinite.
     pub fn refract(&self, v: Vec3, n: Vec3, dn: [Vec3; 2], eta: f32) -> Self {
-        let (v, n) = (v.as_dvec3(), n.as_dvec3());
-        let column = |i: usize| refract(v, n, dn[i].as_dvec3(), self.dv[i].as_dvec3(), f64::from(eta)).as_vec3();
+        let (v, n) = (unit(v), unit(n));
+        let column = |i: usize| stored(refract(v, n, dn[i].as_dvec3(), self.dv[i].as_dvec3(), f64::from(eta)));
         Self { dp: self.dp, dv: [column(0), column(1)] }
     }
 
-    /// Shortens columns longer than `length` (metres) in `dp` and longer than `angle` in `dv`; a column that is not
-    /// finite becomes zero. Returns whether anything was changed.
+    /// Shortens columns longer than `length` (metres) in `dp` and longer than `angle` in `dv`. A column that became
+    /// infinite gets the largest length in the direction of its infinite components; one that is no number has no
+    /// direction and becomes zero. Returns whether anything was changed.
     pub fn bound(&mut self, length: f32, angle: f32) -> bool {
         let mut changed = false;
         for (columns, limit) in [(&mut self.dp, length), (&mut self.dv, angle)] {
             for c in columns {
-                if !c.is_finite() {
-                    *c = Vec3::ZERO;
-                    changed = true;
+                let longest = c.abs().max_element();
+                if c.is_finite() && longest * 2.0 <= limit {
                     continue;
                 }
-                let longest = c.abs().max_element();
-                if longest * 2.0 > limit {
-                    let l = f64::from(limit) / c.as_dvec3().length();
-                    if l < 1.0 {
-                        *c = (c.as_dvec3() * l).as_vec3();
-                        changed = true;
-                    }
+                let along = if c.is_finite() {
+                    c.as_dvec3()
+                } else {
+                    c.as_dvec3().map(|x| if x.is_infinite() { x.signum() } else { 0.0 })
+                };
+                let l = along.length();
+                if !c.is_finite() || l > f64::from(limit) {
+                    *c = if l > 0.0 { (along * (f64::from(limit) / l)).as_vec3() } else { Vec3::ZERO };
+                    changed = true;
                 }
             }
         }
@@ -67,10 +69,23 @@ impl Differential {
     }
 }
 
+/// A column as it is stored: one too long for f32 keeps its direction.
+pub(super) fn stored(c: DVec3) -> Vec3 {
+    const LONGEST: f64 = 1e38;
+    let longest = c.abs().max_element();
+    if longest > LONGEST { (c * (LONGEST / longest)).as_vec3() } else { c.as_vec3() }
+}
+
+/// A unit vector in f64: the length of one in f32 is wrong by 6·10⁻⁸, which near the critical angle is not little.
+pub(super) fn unit(v: Vec3) -> DVec3 {
+    let v = v.as_dvec3();
+    v / v.length()
+}
+
 /// One column of `dQ = (I - V Nᵀ/(VᵀN)) (dP + s dV)`.
 fn transfer(v: DVec3, n: DVec3, s: f64, dp: DVec3, dv: DVec3) -> DVec3 {
     let vn = v.dot(n);
-    let vn = vn.abs().max(GRAZING).copysign(vn);
+    let vn = vn.abs().max(SMALLEST).copysign(vn);
     let moved = dp + dv * s;
     moved - v * (n.dot(moved) / vn)
 }
@@ -83,7 +98,7 @@ fn reflect(v: DVec3, n: DVec3, dn: DVec3, dv: DVec3) -> DVec3 {
 /// One column of `dW = (η I - η N (1 + η VᵀN/√ε) Nᵀ) dV - (μ I + η N (1 + η VᵀN/√ε) Vᵀ) dN`.
 fn refract(v: DVec3, n: DVec3, dn: DVec3, dv: DVec3, eta: f64) -> DVec3 {
     let vn = v.dot(n);
-    let root = (1.0 - eta * eta * (1.0 - vn * vn)).max(0.0).sqrt().max(CRITICAL);
+    let root = (1.0 - eta * eta * (1.0 - vn * vn)).max(0.0).sqrt().max(SMALLEST);
     let mu = eta * vn + root;
     let bracket = eta * (1.0 + eta * vn / root);
     dv * eta - n * (bracket * n.dot(dv)) - dn * mu - n * (bracket * v.dot(dn))
@@ -241,6 +256,24 @@ mod tests {
                 prop_assert!(c.is_finite() && c.length() <= 10.001);
             }
         }
+    }
+
+    /// In the plane of the surface and at the critical angle a column is endless: the longest allowed, and it says so.
+    #[test]
+    fn what_would_be_infinite_is_the_longest_allowed() {
+        let d = Differential { dp: [Vec3::Y, Vec3::ZERO], dv: [Vec3::Y, Vec3::ZERO] };
+        let mut along = d.transfer(Vec3::X, Vec3::Y, 1.0);
+        assert!(along.dp[0].is_finite() && along.bound(2.0, 10.0));
+        assert!((along.dp[0].abs() - Vec3::X * 2.0).length() < 1e-6 && along.dp[1] == Vec3::ZERO);
+        let (sin, cos) = libm::sincos(libm::asin(1.0 / 1.5));
+        let critical = Vec3::new(sin as f32, -cos as f32, 0.0);
+        let mut through = d.refract(critical, Vec3::Y, [Vec3::ZERO; 2], 1.5);
+        assert!(through.bound(2.0, 10.0));
+        assert!((through.dv[0].length() - 10.0).abs() < 1e-5 && through.dv[0].normalize().y.abs() > 0.99);
+        let endless = Vec3::new(1.0, f32::NEG_INFINITY, 0.0);
+        let mut endless = Differential { dp: [endless, Vec3::ZERO], ..Default::default() };
+        assert!(endless.bound(2.0, 10.0));
+        assert_eq!(endless.dp[0], Vec3::NEG_Y * 2.0);
     }
 
     #[test]

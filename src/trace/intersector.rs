@@ -46,15 +46,26 @@ pub struct Intersector {
 ///
 /// `obvhs` skips boxes that a ray leaves within 10⁻⁴ units of its start. In a scene of this size that is less than
 /// rounding, whatever unit the scene is in; and a power of two scales without rounding.
-const SCALED_RADIUS: f32 = (1u32 << 20) as f32;
+const SCALED_RADIUS: f32 = (1u32 << SCALED_EXPONENT) as f32;
+const SCALED_EXPONENT: i32 = 20;
 
 /// Boxes grow by this part of the scene's radius, so that no rounding in the box test loses a hit in the leaf test.
 const PADDING: f32 = 1e-6;
 
+/// Distance from the local origin, in scaled units, beyond which a ray's start is moved along it for the box test:
+/// farther away rounding would be more than the padding.
+const FAR: f32 = 4.0 * SCALED_RADIUS;
+
+/// Smallest component of a direction that the box test tells from none: at [`FAR`] it moves a ray by nothing, and its
+/// inverse times a coordinate is no infinity.
+const SMALLEST_COMPONENT: f32 = 1e-20;
+
 impl Intersector {
     /// Builds over all of `geometry`; `radius` is the scene's.
     pub fn new(geometry: &Geometry, radius: f32) -> Self {
-        let scale = libm::exp2f(libm::floorf(libm::log2f(SCALED_RADIUS / radius)));
+        // The exponent itself, so that a scene in units of another power of two is traced by the same numbers.
+        let exponent = SCALED_EXPONENT - libm::frexpf(radius).1;
+        let scale = libm::ldexpf(1.0, exponent);
         let scale = if scale.is_normal() { scale } else { 1.0 };
         let count = geometry.primitive_count();
         let padding = radius * scale * PADDING;
@@ -85,18 +96,21 @@ impl Intersector {
         Self { bvh, primitives, leaves, triangle_count, scale }
     }
 
-    /// The nearest surface along `ray`. None for a ray that is not finite.
+    /// The nearest surface along `ray`; of surfaces at the same distance the one of lower index. None for a ray that is
+    /// not finite.
     pub fn closest(&self, ray: &Ray) -> Option<Hit> {
         let ray = &Ray { origin: ray.origin * self.scale, ..*ray };
-        let traversal = self.start(ray, f32::INFINITY)?;
+        let start = self.start(ray, f32::INFINITY)?;
         let sheared = ShearedRay::new(ray.origin, ray.direction);
-        let mut best = Hit { t: f32::INFINITY, primitive: 0, weights: [0.0; 2] };
-        self.bvh.ray_traverse(traversal, &mut RayHit::none(), |r, leaf| match self.leaf(ray, &sheared, leaf, r.tmax) {
-            Some((t, b, c)) => {
-                best = Hit { t, primitive: self.primitives[leaf], weights: [b, c] };
-                t
+        let mut best = Hit { t: f32::INFINITY, primitive: u32::MAX, weights: [0.0; 2] };
+        self.bvh.ray_traverse(start.traversal, &mut RayHit::none(), |_, leaf| {
+            match self.leaf(ray, &sheared, leaf, best.t) {
+                Some((t, b, c)) if t < best.t || self.primitives[leaf] < best.primitive => {
+                    best = Hit { t, primitive: self.primitives[leaf], weights: [b, c] };
+                    start.before(t)
+                }
+                _ => f32::INFINITY,
             }
-            None => f32::INFINITY,
         });
         best.t.is_finite().then_some(Hit { t: best.t / self.scale, ..best })
     }
@@ -104,22 +118,49 @@ impl Intersector {
     /// Whether anything lies along `ray` before the distance `t_max`, metres.
     pub fn any(&self, ray: &Ray, t_max: f32) -> bool {
         let ray = &Ray { origin: ray.origin * self.scale, ..*ray };
-        let Some(traversal) = self.start(ray, t_max * self.scale) else {
+        let t_max = t_max * self.scale;
+        let Some(start) = self.start(ray, t_max) else {
             return false;
         };
         let sheared = ShearedRay::new(ray.origin, ray.direction);
-        !self.bvh.ray_traverse_miss(traversal, |r, leaf| {
-            self.leaf(ray, &sheared, leaf, r.tmax).map_or(f32::INFINITY, |(t, ..)| t)
+        !self.bvh.ray_traverse_miss(start.traversal, |_, leaf| match self.leaf(ray, &sheared, leaf, t_max) {
+            // Below any limit that the traversal may have, to end it.
+            Some((t, ..)) if t < t_max => f32::NEG_INFINITY,
+            _ => f32::INFINITY,
         })
     }
 
-    fn start(&self, ray: &Ray, t_max: f32) -> Option<obvhs::ray::Ray> {
+    fn start(&self, ray: &Ray, t_max: f32) -> Option<Start> {
         let sound = ray.origin.is_finite()
             && ray.direction.is_finite()
             && ray.direction != Vec3::ZERO
             && t_max > 0.0
             && !self.primitives.is_empty();
-        sound.then(|| obvhs::ray::Ray::new(ray.origin.into(), ray.direction.into(), 0.0, t_max))
+        if !sound {
+            return None;
+        }
+        let (mut origin, mut moved) = (ray.origin, 0.0);
+        if origin.abs().max_element() > FAR {
+            let (o, d) = (origin.as_dvec3(), ray.direction.as_dvec3());
+            let along = -o.dot(d) / d.length_squared() - f64::from(FAR / 2.0);
+            if along > 0.0 {
+                origin = (o + d * along).as_vec3();
+                moved = along as f32;
+            }
+        }
+        // A zero below zero would turn the box test over.
+        let direction = ray.direction + Vec3::ZERO;
+        let inverse = direction.to_array().map(|x| 1.0 / x.abs().max(SMALLEST_COMPONENT).copysign(x));
+        let traversal = obvhs::ray::Ray {
+            origin: origin.into(),
+            direction: direction.into(),
+            inv_direction: Vec3A::from_array(inverse),
+            tmin: 0.0,
+            tmax: t_max,
+        };
+        let mut start = Start { traversal, moved };
+        start.traversal.tmax = start.before(t_max);
+        Some(start)
     }
 
     #[inline]
@@ -130,6 +171,22 @@ impl Intersector {
         } else {
             sphere(ray, shape[0], shape[1].x, t_max).map(|t| (t, 0.0, 0.0))
         }
+    }
+}
+
+/// A ray made ready for the box test.
+struct Start {
+    traversal: obvhs::ray::Ray,
+    /// By how much its start was moved along it.
+    moved: f32,
+}
+
+impl Start {
+    /// Distance from the moved start at which boxes need no longer be opened for a hit at `t`.
+    #[inline]
+    fn before(&self, t: f32) -> f32 {
+        // A part more than rounding may take from a long way.
+        if self.moved > 0.0 { t * (1.0 + 4.0 * f32::EPSILON) - self.moved } else { t }
     }
 }
 
@@ -148,7 +205,7 @@ fn sphere(ray: &Ray, center: Vec3, radius: f32, t_max: f32) -> Option<f32> {
     let half = (rest / a).sqrt();
     let (near, far) = ((-b / a - half) as f32, (-b / a + half) as f32);
     let t = if near > 0.0 { near } else { far };
-    (t > 0.0 && t < t_max).then_some(t)
+    (t > 0.0 && t <= t_max).then_some(t)
 }
 
 /// Slow builders pay off while building is short against the rays to come.
@@ -217,6 +274,72 @@ mod tests {
                 let t_max = 0.3 + y[2];
                 assert_eq!(intersector.any(&ray, t_max), brute < t_max);
             }
+        }
+    }
+
+    /// A component of -0 is none: without care it turns the box test over, and the ray meets nothing.
+    #[test]
+    fn a_zero_has_no_sign() {
+        let g = soup(200, 20);
+        let intersector = Intersector::new(&g, 1.0);
+        let sequence = Sequence::new(Sampling::Random, 7);
+        let mut hits = 0;
+        for i in 0..3000 {
+            let x = sequence.four(i, 0);
+            let mut d = crate::math::frame::uniform_sphere(x[3], x[0]).normalize();
+            d[i as usize % 3] = 0.0;
+            d[(i / 3) as usize % 3] = 0.0;
+            let origin = Vec3::new(x[1], x[2], x[0]);
+            let with = |zero: f32| d.map(|c| if c == 0.0 { zero } else { c });
+            let [a, b] = [0.0, -0.0].map(|zero| Ray { origin, direction: with(zero) });
+            let found = |r| intersector.closest(r).map(|h| (h.t, h.primitive));
+            assert_eq!(found(&a), found(&b));
+            assert_eq!(intersector.any(&a, 0.5), intersector.any(&b, 0.5));
+            hits += u32::from(found(&a).is_some());
+        }
+        assert!(hits > 300, "{hits}");
+    }
+
+    /// From thousands of radii away rays meet what those meet that start nearer on the same line.
+    #[test]
+    fn far_starts_lose_nothing() {
+        let g = soup(400, 60);
+        let intersector = Intersector::new(&g, 1.0);
+        let sequence = Sequence::new(Sampling::Random, 8);
+        for i in 0..3000 {
+            let (x, y) = (sequence.four(i, 0), sequence.four(i, 1));
+            let direction = crate::math::frame::uniform_sphere(x[0], x[1]).normalize();
+            let away = libm::exp2f(13.0 * x[2]);
+            let origin = Vec3::new(y[0], y[1], y[2]) - direction * away;
+            let ray = Ray { origin, direction };
+            let sheared = ShearedRay::new(origin, direction);
+            let brute = (0..400).filter_map(|k| sheared.intersect(&g.corners(k), f32::INFINITY).map(|h| h.0));
+            let spheres = g.spheres.iter().filter_map(|s| sphere(&ray, s.center, s.radius, f32::INFINITY));
+            let brute = brute.chain(spheres).fold(f32::INFINITY, f32::min);
+            assert_eq!(intersector.closest(&ray).map_or(f32::INFINITY, |h| h.t), brute, "{ray:?}");
+            assert_eq!(intersector.any(&ray, away), brute < away);
+        }
+    }
+
+    #[test]
+    fn of_two_surfaces_in_one_place_the_first_is_met() {
+        let mut g = soup(300, 0);
+        let base = g.positions.len() as u32;
+        g.positions.extend([Vec3::ZERO, Vec3::X, Vec3::Y].map(|p| p * 2.0 - Vec3::Z * 0.5));
+        for copy in 0..40 {
+            let at = g.triangles.len() - copy * 7;
+            g.triangles.insert(at, [base, base + 1, base + 2]);
+        }
+        let first = g.triangles.iter().position(|t| t[0] == base).expect("there") as u32;
+        for v in [&mut g.corner_normals, &mut g.corner_uvs] {
+            v.resize(340, [NONE; 3]);
+        }
+        g.triangle_materials.resize(340, 0);
+        let intersector = Intersector::new(&g, 1.0);
+        for i in 0..100 {
+            let origin = Vec3::new(0.1 + 0.005 * i as f32, 0.3, -1.0);
+            let hit = intersector.closest(&Ray { origin, direction: Vec3::Z }).expect("the wall");
+            assert_eq!(hit.primitive, first);
         }
     }
 

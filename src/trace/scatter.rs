@@ -2,8 +2,9 @@
 
 use crate::math::rgb::Rgb;
 use crate::scene::{Material, Scene};
+use crate::trace::differential::unit;
 use crate::trace::{Differential, Surface};
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 /// Share of the light that a specular surface sends into each of its two directions, in `[0, 1]` per channel.
 #[derive(Clone, Copy, Debug)]
@@ -19,23 +20,27 @@ pub struct SpecularWeights {
 /// A ray that leaves a specular surface.
 #[derive(Clone, Copy, Debug)]
 pub struct SpecularRay {
+    /// Start, a little off the surface on the side to which it goes, metres.
+    pub origin: Vec3,
     /// Unit direction.
     pub direction: Vec3,
     /// Its differential; `dp` at the surface.
     pub differential: Differential,
     /// Whether the shading normal would have sent it to the wrong side, so that the flat normal took its place.
     pub beyond_horizon: bool,
+    /// Whether the corners' normals cancel there, so that the flat normal took their place.
+    pub without_shading: bool,
 }
 
 /// Weights of a specular material for light along the unit direction `v`; None for other materials.
 pub fn specular_weights(material: &Material, surface: &Surface, v: Vec3) -> Option<SpecularWeights> {
-    let cos = -v.dot(shading_towards(surface, v));
+    let cos = -unit(v).dot(unit(shading_towards(surface, v)));
     match *material {
         Material::Mirror { reflectance } => {
             Some(SpecularWeights { reflected: reflectance, refracted: Rgb::ZERO, eta: 1.0 })
         }
         Material::Metal { reflectance } => {
-            let rest = (1.0 - cos).clamp(0.0, 1.0);
+            let rest = (1.0 - cos).clamp(0.0, 1.0) as f32;
             let fresnel = rest * rest * rest * rest * rest;
             Some(SpecularWeights {
                 reflected: reflectance + (Rgb::ONE - reflectance) * fresnel,
@@ -45,7 +50,7 @@ pub fn specular_weights(material: &Material, surface: &Surface, v: Vec3) -> Opti
         }
         Material::Dielectric { ior, .. } => {
             let eta = if surface.front { 1.0 / ior } else { ior };
-            let reflected = fresnel(cos, eta);
+            let reflected = fresnel(cos, eta) as f32;
             Some(SpecularWeights { reflected: Rgb::splat(reflected), refracted: Rgb::splat(1.0 - reflected), eta })
         }
         _ => None,
@@ -54,51 +59,69 @@ pub fn specular_weights(material: &Material, surface: &Surface, v: Vec3) -> Opti
 
 /// Fresnel reflectance of a smooth dielectric for unpolarised light; `cos` of the incident angle, `eta = n₁/n₂`.
 ///
-/// 1 beyond the critical angle.
-pub fn fresnel(cos: f32, eta: f32) -> f32 {
-    let cos = cos.clamp(0.0, 1.0);
-    let sin2 = eta * eta * (1.0 - cos * cos);
-    if sin2 >= 1.0 {
+/// 1 beyond the critical angle. f64, for it falls from 1 there like a root.
+pub fn fresnel(cos: f64, eta: f32) -> f64 {
+    let (cos, eta) = (cos.clamp(0.0, 1.0), f64::from(eta));
+    let Some(inner) = refracted_cosine(cos, eta) else {
         return 1.0;
-    }
-    let inner = (1.0 - sin2).sqrt();
+    };
     let parallel = (cos - eta * inner) / (cos + eta * inner);
     let perpendicular = (eta * cos - inner) / (eta * cos + inner);
     let r = (parallel * parallel + perpendicular * perpendicular) / 2.0;
     if r.is_finite() { r.clamp(0.0, 1.0) } else { 1.0 }
 }
 
+/// Cosine of the refracted angle, √ε; None from the critical angle on.
+fn refracted_cosine(cos: f64, eta: f64) -> Option<f64> {
+    let squared = 1.0 - eta * eta * (1.0 - cos * cos);
+    (squared > 0.0).then(|| squared.sqrt())
+}
+
 /// The reflected ray. `d` is the differential transferred to the surface.
 pub fn reflected(scene: &Scene, surface: &Surface, v: Vec3, d: &Differential) -> SpecularRay {
-    let n = shading_towards(surface, v);
-    let direction = (v - n * (2.0 * v.dot(n))).normalize();
-    if direction.dot(surface.normal) > 0.0 {
-        let dn = smooth_differential(scene, surface, n, d);
-        return SpecularRay { direction, differential: d.reflect(v, n, dn), beyond_horizon: n != surface.shading };
-    }
-    let n = surface.normal;
-    SpecularRay {
-        direction: (v - n * (2.0 * v.dot(n))).normalize(),
-        differential: d.reflect(v, n, [Vec3::ZERO; 2]),
-        beyond_horizon: true,
-    }
+    let mirror = |n: Vec3| {
+        let (v, n) = (unit(v), unit(n));
+        v - n * (2.0 * v.dot(n))
+    };
+    let bent = shading_towards(surface, v);
+    let stays = mirror(bent).dot(surface.normal.as_dvec3()) > 0.0;
+    let n = if stays { bent } else { surface.normal };
+    let dn = smooth_differential(scene, surface, n, d);
+    leaving(scene, surface, mirror(n), d.reflect(v, n, dn), n, true)
 }
 
 /// The refracted ray for the ratio `eta` of [`SpecularWeights`]; at total internal reflection the grazing direction.
 pub fn refracted(scene: &Scene, surface: &Surface, v: Vec3, d: &Differential, eta: f32) -> SpecularRay {
     let bend = |n: Vec3| {
+        let (v, n, eta) = (unit(v), unit(n), f64::from(eta));
         let vn = v.dot(n);
-        let root = (1.0 - eta * eta * (1.0 - vn * vn)).max(0.0).sqrt();
-        (v * eta - n * (eta * vn + root)).normalize()
+        let root = refracted_cosine(vn, eta).unwrap_or(0.0);
+        v * eta - n * (eta * vn + root)
     };
-    let n = shading_towards(surface, v);
-    let direction = bend(n);
-    if direction.dot(surface.normal) < 0.0 {
-        let dn = smooth_differential(scene, surface, n, d);
-        return SpecularRay { direction, differential: d.refract(v, n, dn, eta), beyond_horizon: n != surface.shading };
+    let bent = shading_towards(surface, v);
+    let stays = bend(bent).dot(surface.normal.as_dvec3()) < 0.0;
+    let n = if stays { bent } else { surface.normal };
+    let dn = smooth_differential(scene, surface, n, d);
+    leaving(scene, surface, bend(n), d.refract(v, n, dn, eta), n, false)
+}
+
+/// A ray that leaves along `w` by the normal `n`, before the surface or behind it.
+fn leaving(
+    scene: &Scene,
+    surface: &Surface,
+    w: DVec3,
+    differential: Differential,
+    n: Vec3,
+    before: bool,
+) -> SpecularRay {
+    SpecularRay {
+        // Not by the direction's sign, which rounding may turn at grazing angles.
+        origin: surface.beside(scene, before),
+        direction: w.normalize().as_vec3(),
+        differential,
+        beyond_horizon: n != surface.shading,
+        without_shading: surface.without_shading,
     }
-    let n = surface.normal;
-    SpecularRay { direction: bend(n), differential: d.refract(v, n, [Vec3::ZERO; 2], eta), beyond_horizon: true }
 }
 
 /// The shading normal, or the flat one where the shading normal faces away from the ray.
@@ -118,8 +141,8 @@ mod tests {
     fn fresnel_has_its_known_values() {
         // Normal incidence: ((n - 1)/(n + 1))² = 0.04 for 1.5; Brewster's angle: half of the perpendicular part.
         assert!((fresnel(1.0, 1.0 / 1.5) - 0.04).abs() < 1e-6);
-        let brewster = (1.0f32 / (1.0 + 1.5 * 1.5)).sqrt();
-        let perpendicular = ((1.5f32 * 1.5 - 1.0) / (1.5 * 1.5 + 1.0)).powi(2);
+        let brewster = (1.0f64 / (1.0 + 1.5 * 1.5)).sqrt();
+        let perpendicular = ((1.5f64 * 1.5 - 1.0) / (1.5 * 1.5 + 1.0)).powi(2);
         assert!((fresnel(brewster, 1.0 / 1.5) - perpendicular / 2.0).abs() < 1e-5);
         assert_eq!(fresnel(0.3, 1.5), 1.0);
         assert_eq!(fresnel(0.0, 1.0 / 1.5), 1.0);
@@ -129,8 +152,8 @@ mod tests {
     #[test]
     fn fresnel_is_the_same_from_both_sides() {
         for i in 1..100 {
-            let cos = i as f32 / 100.0;
-            let inner = (1.0 - (1.0 - cos * cos) / 2.25f32).sqrt();
+            let cos = f64::from(i) / 100.0;
+            let inner = (1.0 - (1.0 - cos * cos) / 2.25f64).sqrt();
             assert!((fresnel(cos, 1.0 / 1.5) - fresnel(inner, 1.5)).abs() < 1e-4);
         }
     }

@@ -1,8 +1,8 @@
 //! The surface at a hit: position, normals, and how the shading normal turns over a footprint.
 
-use crate::math::frame::unit_or;
 use crate::scene::geometry::NONE;
 use crate::scene::{Geometry, Scene};
+use crate::trace::differential::stored;
 use crate::trace::{Hit, Ray};
 use glam::{DVec3, Vec2, Vec3};
 
@@ -23,21 +23,31 @@ pub struct Surface {
     pub primitive: u32,
     /// Index of the material.
     pub material: u32,
+    /// Whether the corners' normals cancel here, so that the flat normal shades.
+    pub without_shading: bool,
     weights: [f32; 2],
 }
+
+/// Length of an interpolated normal below which it is the rounding of its corners' unit normals.
+const NO_NORMAL: f64 = 4.0 * f32::EPSILON as f64;
 
 impl Surface {
     /// The surface where `ray` meets `hit`.
     pub fn new(scene: &Scene, ray: &Ray, hit: &Hit) -> Self {
         let g = &scene.geometry;
         let index = hit.primitive as usize;
+        let mut without_shading = false;
         let (position, outward, shading, uv) = if index < g.triangles.len() {
             let [a, b, c] = g.corners(index);
             let [wb, wc] = hit.weights;
-            let normal = unit_or((b - a).as_dvec3().cross((c - a).as_dvec3()).as_vec3(), Vec3::Y);
-            let shading = match corner_normals(g, index) {
-                Some([na, nb, nc]) => {
-                    let n = unit_or(na * (1.0 - wb - wc) + nb * wb + nc * wc, normal);
+            let normal = flat_normal([a, b, c]);
+            let shading = match interpolated(g, index, hit.weights) {
+                Some(sum) if sum.length() < NO_NORMAL => {
+                    without_shading = true;
+                    normal
+                }
+                Some(sum) => {
+                    let n = sum.normalize();
                     if n.dot(normal) < 0.0 { -n } else { n }
                 }
                 None => normal,
@@ -52,36 +62,38 @@ impl Surface {
             (a + (b - a) * wb + (c - a) * wc, normal, shading, uv)
         } else {
             let s = g.spheres[index - g.triangles.len()];
-            let normal = unit_or(ray.origin + ray.direction * hit.t - s.center, Vec3::Y);
-            (s.center + normal * s.radius, normal, normal, Vec2::ZERO)
+            let normal = sphere_normal(ray, s.center.as_dvec3(), f64::from(s.radius), f64::from(hit.t));
+            let position = s.center.as_dvec3() + normal * f64::from(s.radius);
+            (position.as_vec3(), normal, normal, Vec2::ZERO)
         };
-        let front = outward.dot(ray.direction) < 0.0;
+        let front = outward.dot(ray.direction.as_dvec3()) < 0.0;
         let side = if front { 1.0 } else { -1.0 };
         Self {
             position,
-            normal: outward * side,
-            shading: shading * side,
+            normal: (outward * side).as_vec3(),
+            shading: (shading * side).as_vec3(),
             front,
             uv,
             primitive: hit.primitive,
             material: g.material(index) as u32,
+            without_shading,
             weights: hit.weights,
         }
     }
 
     /// Change dN of the unit shading normal for changes `dq` of the position in the surface (Igehy 1999, section 3.3).
     ///
-    /// Zero on flat triangles, `dq/r` on spheres, the derivative of the interpolated normal on smooth triangles. A
-    /// triangle too thin to have a derivative counts as flat.
+    /// Zero on flat triangles, `dq/r` on spheres, the derivative of the interpolated normal on smooth triangles; zero
+    /// too where [`Surface::without_shading`]. Always finite for finite `dq`.
     pub fn normal_differential(&self, scene: &Scene, dq: [Vec3; 2]) -> [Vec3; 2] {
         let g = &scene.geometry;
         let index = self.primitive as usize;
         if index >= g.triangles.len() {
-            let r = g.spheres[index - g.triangles.len()].radius;
+            let r = f64::from(g.spheres[index - g.triangles.len()].radius);
             let side = if self.front { 1.0 } else { -1.0 };
-            return dq.map(|d| d * (side / r));
+            return dq.map(|d| stored(d.as_dvec3() * (side / r)));
         }
-        let Some(n) = corner_normals(g, index) else {
+        let (Some(n), Some(sum)) = (corner_normals(g, index), interpolated(g, index, self.weights)) else {
             return [Vec3::ZERO; 2];
         };
         let [a, b, c] = g.corners(index).map(|p| p.as_dvec3());
@@ -89,13 +101,8 @@ impl Surface {
         let (e1, e2) = (b - a, c - a);
         let area2 = e1.cross(e2);
         let scale = area2.length_squared();
-        if scale <= 0.0 {
-            return [Vec3::ZERO; 2];
-        }
-        let [wb, wc] = self.weights.map(f64::from);
-        let sum = na * (1.0 - wb - wc) + nb * wb + nc * wc;
         let length = sum.length();
-        if length < 1e-6 {
+        if scale <= 0.0 || length < NO_NORMAL {
             return [Vec3::ZERO; 2];
         }
         let unit = sum / length;
@@ -106,24 +113,54 @@ impl Surface {
             let db = d.cross(e2).dot(area2) / scale;
             let dc = e1.cross(d).dot(area2) / scale;
             let dn: DVec3 = (nb - na) * db + (nc - na) * dc;
-            let dn = (dn - unit * unit.dot(dn)) * (towards / length);
-            if dn.is_finite() { dn.as_vec3() } else { Vec3::ZERO }
+            stored((dn - unit * unit.dot(dn)) * (towards / length))
         })
     }
 
     /// Start of a ray that leaves the surface along `direction`, a little off it on that side.
     pub fn leave(&self, scene: &Scene, direction: Vec3) -> Vec3 {
+        self.beside(scene, direction.dot(self.normal) >= 0.0)
+    }
+
+    /// Start of a ray a little off the surface, before it (on the side of its normal) or behind it.
+    ///
+    /// For a ray that is known to stay on that side, although rounding may have turned it to the other.
+    pub fn beside(&self, scene: &Scene, before: bool) -> Vec3 {
         let offset = scene.radius * SELF_INTERSECTION;
-        if direction.dot(self.normal) >= 0.0 {
-            self.position + self.normal * offset
-        } else {
-            self.position - self.normal * offset
-        }
+        if before { self.position + self.normal * offset } else { self.position - self.normal * offset }
     }
 }
 
 /// Offset of rays that leave a surface, relative to the scene's radius: some 32 units in the last place.
 pub const SELF_INTERSECTION: f32 = 2e-6;
+
+/// Unit normal of a triangle's front; f64 from the corners on, as the edges of a needle are nearly parallel and products
+/// of short ones vanish in f32. The y axis for one without area.
+pub fn flat_normal(corners: [Vec3; 3]) -> DVec3 {
+    let [a, b, c] = corners.map(|p| p.as_dvec3());
+    (b - a).cross(c - a).try_normalize().unwrap_or(DVec3::Y)
+}
+
+/// Unit normal of a sphere where a ray meets it near the distance `t`, whose last digits an f32 does not have.
+///
+/// They count where the sphere is small against the way to it.
+fn sphere_normal(ray: &Ray, center: DVec3, radius: f64, t: f64) -> DVec3 {
+    let d = ray.direction.as_dvec3();
+    let near = ray.origin.as_dvec3() + d * t - center;
+    // One of the two roots of |near + d x|² = r², the one nearer to 0.
+    let (a, b, c) = (d.length_squared(), near.dot(d), near.length_squared() - radius * radius);
+    let root = (b * b - a * c).max(0.0).sqrt();
+    let x = if b > 0.0 { -c / (b + root) } else { c / (root - b) };
+    let at = if x.is_finite() { near + d * x } else { near };
+    at.try_normalize().unwrap_or(DVec3::Y)
+}
+
+/// The normal interpolated between a triangle's corners, of any length; None for a flat triangle.
+fn interpolated(g: &Geometry, triangle: usize, weights: [f32; 2]) -> Option<DVec3> {
+    let [na, nb, nc] = corner_normals(g, triangle)?.map(|n| n.as_dvec3());
+    let [wb, wc] = weights.map(f64::from);
+    Some(na * (1.0 - wb - wc) + nb * wb + nc * wc)
+}
 
 fn corner_normals(g: &Geometry, triangle: usize) -> Option<[Vec3; 3]> {
     let n = g.corner_normals[triangle];
@@ -136,6 +173,33 @@ mod tests {
     use crate::scene::built_in;
     use crate::scene::source::open_built_in;
     use crate::trace::Intersector;
+
+    #[test]
+    fn normals_of_needles_and_specks_are_theirs() {
+        // A speck whose area vanishes in f32, and a needle whose edges are parallel but for their last digits.
+        let tiny = [Vec3::ZERO, Vec3::X * 1e-25, Vec3::Y * 1e-24];
+        assert_eq!(flat_normal(tiny), DVec3::Z);
+        let needle = [Vec3::ZERO, Vec3::new(1.0, 0.3, 0.7), Vec3::new(1.0, 0.3, 0.700_000_05)];
+        let expected = DVec3::new(f64::from(0.3f32), -1.0, 0.0).normalize();
+        assert!((flat_normal(needle) - expected).length() < 1e-7);
+        assert_eq!(flat_normal([Vec3::ONE; 3]), DVec3::Y);
+    }
+
+    /// A sphere of a thousandth of the way to it: the normal is that of the place where the line of the ray meets it.
+    #[test]
+    fn a_far_small_sphere_keeps_its_normals() {
+        let (center, radius) = (DVec3::new(30.0, -20.0, 90.0), 0.01);
+        for i in 0..50 {
+            let off = DVec3::new(0.003, -0.004, 0.0) * (f64::from(i) / 30.0);
+            let ray = Ray { origin: Vec3::ZERO, direction: (center + off).normalize().as_vec3() };
+            let d = ray.direction.as_dvec3().normalize();
+            let b = d.dot(center);
+            let half = (radius * radius - (center - d * b).length_squared()).sqrt();
+            let expected = (d * (b - half) - center) / radius;
+            let found = sphere_normal(&ray, center, radius, f64::from((b - half) as f32));
+            assert!((found - expected).length() < 1e-6, "{i}");
+        }
+    }
 
     /// dN on the ring's smooth wall and on a sphere against finite differences of the traced normal.
     #[test]

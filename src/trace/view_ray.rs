@@ -2,7 +2,7 @@
 
 use crate::scene::Camera;
 use crate::trace::Differential;
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 impl Camera {
     /// Unit direction through the point `(x, y)` of an image of `size` pixels, `y` down, and its differential
@@ -10,14 +10,17 @@ impl Camera {
     ///
     /// With `half = 0.5` the parallelogram `±dP₀ ± dP₁` at the hit covers one pixel.
     pub fn ray(&self, x: f32, y: f32, size: [u32; 2], half: f32) -> (Vec3, Differential) {
-        let [right, up, forward] = self.frame;
-        let step = 2.0 * self.tan_half_fov_y / size[1] as f32;
-        let v = forward + right * ((x - size[0] as f32 / 2.0) * step) + up * ((size[1] as f32 / 2.0 - y) * step);
+        // f64: across a narrow view directions differ in their last digits, and a wide one cancels at its corners.
+        let [right, up, forward] = self.frame.map(|v| v.as_dvec3());
+        let [w, h] = size.map(f64::from);
+        let step = 2.0 * f64::from(self.tan_half_fov_y) / h;
+        let v = forward + right * ((f64::from(x) - w / 2.0) * step) + up * ((h / 2.0 - f64::from(y)) * step);
         let length = v.length();
         let direction = v / length;
-        let along = |dx: Vec3| (dx - direction * direction.dot(dx)) / length;
-        let dv = [along(right * (step * half)), along(up * (-step * half))];
-        (direction, Differential { dp: [Vec3::ZERO; 2], dv })
+        let half = f64::from(half) * step / length;
+        let along = |dx: DVec3| (direction.cross(dx).cross(direction) * half).as_vec3();
+        let dv = [along(right), along(-up)];
+        (direction.as_vec3(), Differential { dp: [Vec3::ZERO; 2], dv })
     }
 
     /// Place in an image of `size` pixels where a point is seen, `y` down; None behind the camera.

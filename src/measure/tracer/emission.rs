@@ -59,7 +59,7 @@ pub fn start(scene: &Scene, light: &Light, aim: Option<&Aim>, x: [f32; 4]) -> Op
         }
         Light::Spot { position, direction, cos_half, falloff, .. } => {
             let (at, axis) = (position.as_dvec3(), direction.as_dvec3());
-            let (edge, falloff) = (f64::from(*cos_half), f64::from(*falloff));
+            let (edge, falloff) = (*cos_half, f64::from(*falloff));
             let own = |u: f64, v: f64| directions::around(axis, spot_cosine(u, edge, falloff), v);
             from(at, aimed(aim, at, own, |w| spot_density(w.dot(axis), edge, falloff), x[0], x[1]))
         }

@@ -91,7 +91,7 @@ fn arriving(light: &Light, p: DVec3, n: DVec3, scene_radius: f64, u: f64, v: f64
     match light {
         Light::Point { position, power } => from_point(p, n, position.as_dvec3(), |_| power.as_dvec3() / (4.0 * PI)),
         Light::Spot { position, direction, cos_half, falloff, power } => {
-            let (axis, edge, exponent) = (direction.as_dvec3(), f64::from(*cos_half), f64::from(*falloff));
+            let (axis, edge, exponent) = (direction.as_dvec3(), *cos_half, f64::from(*falloff));
             from_point(p, n, position.as_dvec3(), |w| power.as_dvec3() * spot_density((-w).dot(axis), edge, exponent))
         }
         Light::Directional { direction, irradiance, .. } => {

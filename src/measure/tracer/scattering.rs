@@ -105,9 +105,9 @@ pub fn medium_beyond(surface: &Surface) -> Option<u32> {
 /// What glass lets through over `distance` metres; one outside of glass.
 pub fn transmittance(scene: &Scene, medium: Option<u32>, distance: f32) -> DVec3 {
     match medium.and_then(|m| scene.materials.get(m as usize)) {
-        Some(Material::Dielectric { transmittance, .. }) => {
-            let over = |t: f32| libm::pow(f64::from(t), f64::from(distance));
-            DVec3::new(over(transmittance.x), over(transmittance.y), over(transmittance.z))
+        Some(Material::Dielectric { absorption, .. }) => {
+            let over = |a: f32| libm::exp(-f64::from(a) * f64::from(distance));
+            DVec3::new(over(absorption.x), over(absorption.y), over(absorption.z))
         }
         _ => DVec3::ONE,
     }

@@ -277,7 +277,7 @@ fn photons_and_paths_agree_on_caustics() {
     let colored = Rgb::new(0.9, 0.6, 0.3);
     let mirror = Material::Mirror { reflectance: colored };
     let metal = Material::Metal { reflectance: colored };
-    let glass = Material::Dielectric { ior: 1.5, transmittance: Rgb::new(0.5, 0.8, 0.01) };
+    let glass = Material::Dielectric { ior: 1.5, absorption: Rgb::new(0.5, 0.8, 0.01).map(|t| -t.ln()) };
     let ring =
         |segments| [("segments = 256", segments), ("radius = 0.2", "radius = 1.2"), ("fov_y = 35", "fov_y = 12")];
     let room = [("radius = 0.06", "radius = 0.35")];
@@ -363,7 +363,7 @@ fn glass_changes_no_radiance() {
     scene.geometry = geometry.into();
     scene.materials = vec![
         Material::Emitter { radiance: Rgb::new(2.0, 1.0, 0.5) },
-        Material::Dielectric { ior: 1.5, transmittance: Rgb::ONE },
+        Material::Dielectric { ior: 1.5, absorption: Rgb::ZERO },
     ];
     scene.lights.clear();
     let s = ReferenceSettings { max_depth: 400, ..settings([16, 16], LightPart::Direct) };

@@ -69,7 +69,11 @@ impl Loader<'_> {
                 if !(1.0..=10.0).contains(&ior) {
                     return self.wrong(at("ior"), format!("must lie in [1, 10], got {ior}"));
                 }
-                Material::Dielectric { ior: ior as f32, transmittance: unit("transmittance", file.transmittance, 1.0)? }
+                unit("transmittance", file.transmittance, 1.0)?;
+                // Black glass keeps a coefficient that is a number.
+                let coefficient = |t: f64| (-libm::log(t)).min(f64::from(f32::MAX)) as f32;
+                let absorption = file.transmittance.unwrap_or([1.0; 3]).map(|t| coefficient(t).max(0.0));
+                Material::Dielectric { ior: ior as f32, absorption: absorption.into() }
             }
             _ => Material::Emitter { radiance: self.power(&at("radiance"), file.radiance, "W/(m² sr)")? },
         })

@@ -336,7 +336,7 @@ impl<'a> Loader<'a> {
             LightSource::Spot { position, direction, half, falloff, power } => Light::Spot {
                 position: local(*position),
                 direction: direction.as_vec3(),
-                cos_half: libm::cos(*half) as f32,
+                cos_half: libm::cos(*half),
                 falloff: *falloff as f32,
                 power: *power,
             },
