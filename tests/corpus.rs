@@ -42,7 +42,7 @@ fn findings_are_refused() {
         (
             "obj/crash-vertex-divided-by-a-tiny-w.obj",
             targets::obj,
-            "mesh.obj:7: OBJ: divided by w = 5e-324, `v` must be",
+            "mesh.obj:8: OBJ: divided by w = 5e-324, `v` must be",
         ),
         (
             "session/crash-light-that-is-no-number.toml",
