@@ -310,7 +310,7 @@ fn total_reflection() -> Outcome {
         let root = (1.0 - (eta * libm::sin(incident)).powi(2)).max(0.0).sqrt();
         // Where the root is the rounding of its terms, so is the direction.
         if weights.refracted.x > 0.0 && root > 1e-7 {
-            let exact = DVec3::new(vd.x * eta, root * f64::from(up), vd.z * eta);
+            let exact = DVec3::new(vd.x * eta, root * up, vd.z * eta);
             let found = through.direction.as_dvec3();
             outcome.see((found - exact).length(), || format!("v {v}: refracted to {found} for {exact}"));
         }

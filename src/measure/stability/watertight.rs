@@ -183,11 +183,11 @@ fn edges_and_vertices() -> Outcome {
                 let outside = i % 8 >= 4;
                 // From within: from the centre or near it. From without: towards the centre, through the target.
                 let inner = if i % 4 == 3 { p.lerp(q, 0.7) } else { target };
-                let near = inner * if i % 3 == 0 { 0.0 } else { random.range(-0.2, 0.9) as f32 * 1e-2 };
+                let near = inner * if i.is_multiple_of(3) { 0.0 } else { random.range(-0.2, 0.9) as f32 * 1e-2 };
                 let (origin, end) = if outside {
                     // As far away as a direction in f32 can be aimed at it from.
                     let farthest = libm::log10(star.thin / (4.0 * F32)).min(4.0);
-                    let away = if i % 3 == 0 { random.decade(0.0, farthest) } else { random.range(0.0, 3.0) };
+                    let away = if i.is_multiple_of(3) { random.decade(0.0, farthest) } else { random.range(0.0, 3.0) };
                     (target + target.normalize() * (radius * (1e-3 + away as f32)), Vec3::ZERO)
                 } else {
                     (near, target)
