@@ -27,7 +27,7 @@ fn view(center: Vec3, axes: [Vec3; 2]) -> View {
 
 /// Integral of the estimate of one photon of unit power over the plane, on a grid around it.
 fn energy(e: &dyn Estimator, p: &MapPhoton, axes: [Vec3; 2], n: i32) -> f64 {
-    let half = 1.05 * (f64::from(p.reach) * 1.5 + axes.iter().map(|a| f64::from(a.length())).sum::<f64>());
+    let half = 1.05 * (f64::from(p.reach()) * 1.5 + axes.iter().map(|a| f64::from(a.length())).sum::<f64>());
     let cell = 2.0 * half / f64::from(n);
     let mut sum = 0.0;
     for i in 0..n {

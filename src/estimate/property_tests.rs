@@ -95,7 +95,7 @@ proptest! {
         let (before, after) = (mapped(p.photon, 1.0), mapped(photon, s));
         let size = axes[0].length() + axes[1].length() + (center - p.photon.position).length() + 2.0;
         // Places keep a few units in the last place; a weight changes by that over the footprint's shortest axis.
-        let shortest = f64::from(before.reach) / before.condition();
+        let shortest = f64::from(before.reach()) / before.condition();
         let slack = 64.0 * f64::from(f32::EPSILON) * f64::from(size) / shortest;
         for e in all() {
             let (w, v) = (e.weight(&before, &p.view, p.radius), e.weight(&after, &view, p.radius * s));
@@ -247,7 +247,7 @@ proptest! {
                 prop_assert!(overlapping.contains(i), "photon {i} has weight and is not found");
             }
         }
-        let reach = |i: u32| map.photons()[i as usize].reach + query.axes[0].length() + query.axes[1].length();
+        let reach = |i: u32| map.photons()[i as usize].reach() + query.axes[0].length() + query.axes[1].length();
         prop_assert!(overlapping.iter().all(|&i| lit.contains(&i) && distance(i).sqrt() <= 1.001 * reach(i)));
     }
 }

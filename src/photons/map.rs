@@ -20,12 +20,13 @@ pub struct MapPhoton {
     pub position: Vec3,
     /// 1/A, 1/m².
     pub inverse_area: f32,
-    /// Rows of the filter transform, 1/metre, as [`FilterTransform`] has them.
-    pub rows: [Vec3; 3],
+    /// First two rows of the filter transform, 1/metre, as [`FilterTransform`] has them; the third is the normal over the
+    /// longest semi-axis.
+    pub rows: [Vec3; 2],
     /// Cosine and sine of the turn from filter coordinates to those in `dα` and `dβ`.
     pub turn: Vec2,
-    /// Largest semi-axis, metres.
-    pub reach: f32,
+    /// Inverse of the longest semi-axis, 1/metre.
+    pub inverse_reach: f32,
     /// Power, W.
     pub power: Rgb,
     /// Unit normal of its surface.
@@ -38,7 +39,7 @@ impl MapPhoton {
     /// Filter coordinates of a world vector.
     #[inline]
     pub fn to_filter(&self, v: Vec3) -> Vec3 {
-        Vec3::new(self.rows[0].dot(v), self.rows[1].dot(v), self.rows[2].dot(v))
+        Vec3::new(self.rows[0].dot(v), self.rows[1].dot(v), self.normal.dot(v) * self.inverse_reach)
     }
 
     /// Coordinates in `dα` and `dβ` of filter coordinates in the photon's plane.
@@ -50,9 +51,15 @@ impl MapPhoton {
     /// Half-axes `(dα, dβ)` of its footprint in its tangent plane, metres: scaled, and after floor and ceiling.
     pub fn axes(&self) -> [Vec3; 2] {
         // A row is its semi-axis over the square of its length.
-        let [long, short, _] = self.rows.map(|r| r.as_dvec3() / r.as_dvec3().length_squared());
+        let [long, short] = self.rows.map(|r| r.as_dvec3() / r.as_dvec3().length_squared());
         let turn = self.turn.as_dvec2();
         [long * turn.x - short * turn.y, long * turn.y + short * turn.x].map(|c| c.as_vec3())
+    }
+
+    /// Longest semi-axis, metres: the radius of the ball that holds its ellipsoid.
+    #[inline]
+    pub fn reach(&self) -> f32 {
+        1.0 / self.inverse_reach
     }
 
     /// Area of its ellipse, `π ‖dα × dβ‖`, m².
@@ -62,8 +69,8 @@ impl MapPhoton {
 
     /// Longest over shortest semi-axis of its ellipse, at least 1: the condition of its filter transform in the plane.
     pub fn condition(&self) -> f64 {
-        let long = f64::from(self.reach);
-        (std::f64::consts::PI * f64::from(self.inverse_area) * long * long).max(1.0)
+        let long = f64::from(self.inverse_reach);
+        (std::f64::consts::PI * f64::from(self.inverse_area) / (long * long)).max(1.0)
     }
 
     /// Whether it lights the side of a surface that has this unit normal.
@@ -134,9 +141,9 @@ impl PhotonMap {
                 let photon = MapPhoton {
                     position: p.position,
                     inverse_area: t.inverse_area,
-                    rows: t.rows,
+                    rows: [t.rows[0], t.rows[1]],
                     turn: t.turn,
-                    reach: t.reach,
+                    inverse_reach: 1.0 / t.reach,
                     power: p.power,
                     normal: p.normal,
                     direction: p.direction,
@@ -343,7 +350,7 @@ mod tests {
                                 let x =
                                     q.center.as_dvec3() + q.axes[0].as_dvec3() * at(s) + q.axes[1].as_dvec3() * at(t)
                                         - p.position.as_dvec3();
-                                let f = p.rows.map(|r| r.as_dvec3().dot(x));
+                                let f = [p.rows[0], p.rows[1], p.normal * p.inverse_reach].map(|r| r.as_dvec3().dot(x));
                                 least = least.min(f[0] * f[0] + f[1] * f[1] + f[2] * f[2]);
                             }
                         }
@@ -401,7 +408,7 @@ mod tests {
                 if !t.floored {
                     let given = stored.footprint.map(|c| c - stored.normal * stored.normal.dot(c));
                     for (axis, given) in p.axes().into_iter().zip(given) {
-                        assert!((axis - given).length() < 2e-6 * p.reach, "{axis} {given}");
+                        assert!((axis - given).length() < 2e-6 * p.reach(), "{axis} {given}");
                     }
                 }
                 let [a, b] = p.axes();

@@ -201,7 +201,7 @@ impl<'a> HeatmapPass<'a> {
                 if weight != 0.0 {
                     *value = match kind {
                         Heatmap::Photons => *value + 1.0,
-                        Heatmap::LargestFootprint => value.max(f64::from(photon.reach)),
+                        Heatmap::LargestFootprint => value.max(f64::from(photon.reach())),
                         Heatmap::Condition => value.max(photon.condition()),
                         _ => *value + squared(photon, weight, hit, rays),
                     };

@@ -11,7 +11,12 @@ pub struct ShearedRay {
     origin: [f64; 3],
     axes: [usize; 3],
     shear: [f64; 3],
+    /// Origin and shear along the two other axes in f32, for triangles that are clearly missed.
+    rough: ([f32; 3], [f32; 2]),
 }
+
+/// Error of an edge function in f32 over the product of what its corners' coordinates are made of: twenty roundings at most.
+const ROUGH: f32 = 16.0 * f32::EPSILON;
 
 impl ShearedRay {
     /// Prepares a ray; `direction` must be finite and not zero.
@@ -30,7 +35,8 @@ impl ShearedRay {
             std::mem::swap(&mut kx, &mut ky);
         }
         let shear = [d[kx] / d[kz], d[ky] / d[kz], 1.0 / d[kz]];
-        Self { origin: origin.as_dvec3().to_array(), axes: [kx, ky, kz], shear }
+        let rough = (origin.to_array(), [shear[0] as f32, shear[1] as f32]);
+        Self { origin: origin.as_dvec3().to_array(), axes: [kx, ky, kz], shear, rough }
     }
 
     /// Distance along the ray and the weights of the second and third corner, if the triangle is met from either
@@ -38,6 +44,9 @@ impl ShearedRay {
     /// the ray runs along, or that has no area, is not met.
     #[inline]
     pub fn intersect(&self, corners: &[Vec3; 3], t_max: f32) -> Option<(f32, f32, f32)> {
+        if self.clearly_misses(corners) {
+            return None;
+        }
         let [kx, ky, kz] = self.axes;
         let [sx, sy, sz] = self.shear;
         let mut x = [0.0f64; 3];
@@ -62,6 +71,30 @@ impl ShearedRay {
         }
         let t = ((u * z[0] + v * z[1] + w * z[2]) * sz / det) as f32;
         (t > 0.0 && t <= t_max).then(|| (t, (v / det) as f32, (w / det) as f32))
+    }
+
+    /// Whether two edge functions have different signs beyond any rounding of f32. Most triangles that a ray is tested
+    /// against are missed by far.
+    #[inline]
+    fn clearly_misses(&self, corners: &[Vec3; 3]) -> bool {
+        let [kx, ky, kz] = self.axes;
+        let (o, [sx, sy]) = self.rough;
+        let (mut x, mut y) = ([0.0f32; 3], [0.0f32; 3]);
+        let (mut across, mut down) = (0.0f32, 0.0f32);
+        for i in 0..3 {
+            let c = corners[i].to_array();
+            let (dx, dy, dz) = (c[kx] - o[kx], c[ky] - o[ky], c[kz] - o[kz]);
+            // Shears lie in [-1, 1].
+            x[i] = dx - sx * dz;
+            y[i] = dy - sy * dz;
+            across = across.max(dx.abs() + dz.abs());
+            down = down.max(dy.abs() + dz.abs());
+        }
+        let u = x[2] * y[1] - y[2] * x[1];
+        let v = x[0] * y[2] - y[0] * x[2];
+        let w = x[1] * y[0] - y[1] * x[0];
+        let doubt = ROUGH * across * down;
+        u.min(v).min(w) < -doubt && u.max(v).max(w) > doubt
     }
 }
 

@@ -118,7 +118,7 @@ fn render(scene: Scene) -> Result<(), String> {
     for p in pass.maps.all().flat_map(|m| m.photons()) {
         let axes = p.axes();
         assert!(p.rows.iter().chain(&axes).all(|v| v.is_finite()), "{p:?}");
-        assert!(p.inverse_area.is_finite() && p.reach.is_finite() && p.condition().is_finite(), "{p:?}");
+        assert!(p.inverse_area.is_finite() && p.reach().is_finite() && p.condition().is_finite(), "{p:?}");
     }
     let found = inspect(pass, renderer.estimators(), [1, 2]).expect("a pixel of the image");
     for value in &found.estimators {

@@ -310,7 +310,7 @@ fn integrated_weight() -> Outcome {
         let center = position + offset;
         let found = integrated.weight(&photon, &view(center, edges, m.as_vec3(), -m.as_vec3()), 0.0) / 3.0
             * PI
-            * f64::from(photon.reach).powi(2)
+            * f64::from(photon.reach()).powi(2)
             / photon.condition();
         // Exact, from what the map was given, with the floor on the shortest axis.
         let e = Ellipse::of(pa, pb);
@@ -436,8 +436,9 @@ fn any_weight() -> Outcome {
         let peak = 3.0 * f64::from(photon.inverse_area);
         for e in &all {
             let weight = e.weight(&photon, &v, radius);
-            let at =
-                || format!("{}: {weight:e} of {peak:e}; reach {:e} view {edges:?} at {center}", e.name(), photon.reach);
+            let at = || {
+                format!("{}: {weight:e} of {peak:e}; reach {:e} view {edges:?} at {center}", e.name(), photon.reach())
+            };
             // Density's peak is that of its own disc; published multi-sampling and centroids keep below the kernel's.
             let most = if e.lookup() == Lookup::Disc { 3.0 / (PI * f64::from(radius).powi(2)) } else { peak };
             outcome

@@ -226,7 +226,7 @@ fn crowded_maps() -> Outcome {
                 map.overlapping_point(&Query { axes: [Vec3::ZERO; 2], ..query }, &mut found);
                 let inside = |p: &crate::photons::MapPhoton| -> f64 {
                     let x = (center - p.position).as_dvec3();
-                    p.rows.map(|r| r.as_dvec3().dot(x).powi(2)).iter().sum()
+                    [p.rows[0], p.rows[1], p.normal * p.inverse_reach].map(|r| r.as_dvec3().dot(x).powi(2)).iter().sum()
                 };
                 found.sort_unstable();
                 for (p, i) in map.photons().iter().zip(0u32..) {

@@ -63,9 +63,9 @@ mod tests {
         MapPhoton {
             position: Vec3::ZERO,
             inverse_area: t.inverse_area,
-            rows: t.rows,
+            rows: [t.rows[0], t.rows[1]],
             turn: t.turn,
-            reach: t.reach,
+            inverse_reach: 1.0 / t.reach,
             power: Rgb::ONE,
             normal: Vec3::Y,
             direction: Vec3::NEG_Y,
