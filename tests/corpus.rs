@@ -38,7 +38,12 @@ fn sessions() {
 fn findings_are_refused() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/corpus");
     type Target = fn(&[u8]) -> Result<(), String>;
-    let cases: [(&str, Target, &str); 2] = [
+    let cases: [(&str, Target, &str); 3] = [
+        (
+            "scene/crash-choice-with-a-line-end.toml",
+            targets::scene,
+            "render.gather: must be one of knn, overlap, got `k\\n`",
+        ),
         (
             "obj/crash-vertex-divided-by-a-tiny-w.obj",
             targets::obj,

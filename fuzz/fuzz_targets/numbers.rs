@@ -3,6 +3,7 @@
 //! Bytes that change at random rarely leave a file that can be read, and then rarely a number at the end of its range.
 
 /// Numbers at the ends of what formats, 32 bits and kernels hold.
+#[rustfmt::skip]
 const NUMBERS: &[&str] = &[
     "0", "-0.0", "1", "-1", "2", "0.5", "3", "7", "1e-3", "1e-6", "1e-9", "1e-12", "1e-15", "1e-20", "1e-30", "1e-38",
     "1e-45", "1e-160", "1e-300", "5e-324", "1e3", "1e6", "1e9", "1e12", "1e15", "1e20", "1e30", "1e36", "3.4e38",

@@ -1,5 +1,7 @@
 //! Estimators as text: `multi_sampled:n=8,grid=cells`.
 
+use crate::scene::error::one_line;
+
 /// An estimator's name with its settings, not yet checked.
 #[derive(Clone, Debug)]
 pub struct Spec<'a> {
@@ -12,7 +14,7 @@ pub struct Spec<'a> {
 
 /// What is wrong with an estimator's text; one line.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("estimator `{text}`: {what}")]
+#[error("{}", one_line(&format!("estimator `{text}`: {what}")))]
 pub struct SpecError {
     /// The text as given.
     pub text: String,

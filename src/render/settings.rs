@@ -5,6 +5,7 @@ use crate::math::sequence::Sampling;
 use crate::photons::spread::DiffuseSpread;
 use crate::render::memory::check_images;
 use crate::scene::Scene;
+use crate::scene::error::one_line;
 use crate::scene::scene_file::RenderFile;
 use serde::{Deserialize, Serialize};
 
@@ -100,7 +101,7 @@ pub struct RenderSettings {
 
 /// A setting that can't be; one line.
 #[derive(Debug, thiserror::Error)]
-#[error("{place}: {what}")]
+#[error("{}", one_line(&format!("{place}: {what}")))]
 pub struct SettingError {
     /// The flag, or file, line and key.
     pub place: String,
