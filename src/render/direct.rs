@@ -45,7 +45,11 @@ pub fn irradiance(
         let count = if has_area { rays } else { 1 };
         let mut own = DVec3::ZERO;
         for ray in 0..count {
-            let x = sequence.four(index * u64::from(count) + u64::from(ray), LIGHT_SETS + i as u32);
+            // A light without area is one place, or one direction: no numbers are needed.
+            let x = match has_area {
+                true => sequence.four(index * u64::from(count) + u64::from(ray), LIGHT_SETS + i as u32),
+                false => [0.0; 4],
+            };
             if let Some(sample) = sample(light, receiver, scene.radius, x[0], x[1])
                 && !blocked(scene, intersector, receiver, &sample)
             {

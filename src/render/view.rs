@@ -29,6 +29,18 @@ pub struct ViewHit {
 }
 
 impl ViewHit {
+    /// The hit as that estimator sees it, without a copy unless `own` has to hold one.
+    #[inline]
+    pub(super) fn seen<'a>(&'a self, estimator: &dyn Estimator, own: &'a mut View) -> &'a View {
+        match self.flat {
+            Some(query) if estimator.is_exact_mean() => {
+                *own = View { query, ..self.view };
+                own
+            }
+            _ => &self.view,
+        }
+    }
+
     /// The hit as that estimator sees it.
     #[inline]
     pub fn seen_by(&self, estimator: &dyn Estimator) -> View {

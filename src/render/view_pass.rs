@@ -261,7 +261,7 @@ impl ViewPass<'_> {
     ) -> Vec<DVec3> {
         let t = &self.tracer;
         let camera = &t.scene.camera;
-        let size = t.settings.size;
+        let rays = camera.rays(t.settings.size);
         // A random cell of a grid that grows finer, seen through a footprint of the cell's size: every pass is an
         // unbiased sample of the box-filtered pixel, and edges of surfaces are resolved in the end.
         let cells = cells_of_pass(self.pass) as f32;
@@ -281,7 +281,7 @@ impl ViewPass<'_> {
                     [((x[0] * cells).floor() + 0.5) / cells, ((x[1] * cells).floor() + 0.5) / cells]
                 });
                 let (px, py) = sample_position([x, y], [cell % n, cell / n], n, jitter);
-                let (direction, differential) = camera.ray(px, py, size, half);
+                let (direction, differential) = rays.ray(px, py, half);
                 let ray = Ray { origin: camera.position, direction };
                 recorder.ray(cell);
                 let before = scratch.hits.len();
@@ -314,6 +314,7 @@ impl ViewPass<'_> {
         let mut sums = base.to_vec();
         let mut seconds = PartSeconds::default();
         let (mut gathered, mut floored) = (0, 0);
+        let resolution = self.tracer.scene.resolution();
         let mut next = 0;
         while next < scratch.hits.len() {
             let start = Instant::now();
@@ -324,7 +325,7 @@ impl ViewPass<'_> {
                 for map in self.maps.all() {
                     let from = scratch.indices.len();
                     let radius = self.gather(map, slot, next, scratch);
-                    floored += u64::from(radius > 0.0 && radius <= self.tracer.scene.resolution());
+                    floored += u64::from(radius > 0.0 && radius <= resolution);
                     scratch.spans.push((from, scratch.indices.len(), radius));
                 }
                 next += 1;
@@ -336,9 +337,11 @@ impl ViewPass<'_> {
             let mut spans = scratch.spans.iter();
             for hit in &scratch.hits[first..next] {
                 let mut irradiance = DVec3::ZERO;
+                let mut own = hit.view;
+                let seen = hit.seen(slot.estimator, &mut own);
                 for (map, &(from, to, radius)) in self.maps.all().zip(spans.by_ref()) {
                     let found = Gathered { photons: map.photons(), indices: &scratch.indices[from..to], radius };
-                    irradiance += slot.estimator.irradiance(&found, &hit.seen_by(slot.estimator));
+                    irradiance += slot.estimator.irradiance(&found, seen);
                 }
                 sums[hit.pixel as usize] += irradiance * hit.weight.as_dvec3();
             }
@@ -397,7 +400,8 @@ impl ViewPass<'_> {
 
     /// Appends the photons of one hit to the scratch's indices; returns the radius of the disc, if it asks for one.
     fn gather(&self, map: &PhotonMap, slot: &Slot, hit: usize, scratch: &mut Scratch) -> f32 {
-        let query = scratch.hits[hit].seen_by(slot.estimator).query;
+        let mut own = scratch.hits[hit].view;
+        let query = scratch.hits[hit].seen(slot.estimator, &mut own).query;
         let (indices, heap) = (&mut scratch.indices, &mut scratch.heap);
         let k = self.tracer.settings.k;
         match (slot.estimator.lookup(), slot.gather) {

@@ -56,8 +56,11 @@ pub const BYTES_PER_VERTEX: usize = 2 * (2 * size_of::<glam::DVec3>()) + 2 * siz
 
 impl Geometry {
     /// Corners of a triangle.
+    #[inline]
     pub fn corners(&self, triangle: usize) -> [Vec3; 3] {
-        self.triangles[triangle].map(|i| self.positions[i as usize])
+        // Spelled out: a map over an array whose closure may panic is not inlined.
+        let [i, j, k] = self.triangles[triangle];
+        [self.positions[i as usize], self.positions[j as usize], self.positions[k as usize]]
     }
 
     /// Number of triangles and spheres.

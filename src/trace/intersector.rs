@@ -130,9 +130,10 @@ impl Intersector {
         })
     }
 
+    #[inline(always)]
     fn start(&self, ray: &Ray, t_max: f32) -> Option<Start> {
-        let sound = ray.origin.is_finite()
-            && ray.direction.is_finite()
+        // The sum is no number, or infinite, if a part of it is.
+        let sound = (ray.origin + ray.direction).is_finite()
             && ray.direction != Vec3::ZERO
             && t_max > 0.0
             && !self.primitives.is_empty();
@@ -150,11 +151,11 @@ impl Intersector {
         }
         // A zero below zero would turn the box test over.
         let direction = ray.direction + Vec3::ZERO;
-        let inverse = direction.to_array().map(|x| 1.0 / x.abs().max(SMALLEST_COMPONENT).copysign(x));
+        let inverse = direction.abs().max(Vec3::splat(SMALLEST_COMPONENT)).copysign(direction).recip();
         let traversal = obvhs::ray::Ray {
             origin: origin.into(),
             direction: direction.into(),
-            inv_direction: Vec3A::from_array(inverse),
+            inv_direction: inverse.into(),
             tmin: 0.0,
             tmax: t_max,
         };

@@ -84,10 +84,11 @@ pub fn reflected(scene: &Scene, surface: &Surface, v: Vec3, d: &Differential) ->
         v - n * (2.0 * v.dot(n))
     };
     let bent = shading_towards(surface, v);
-    let stays = mirror(bent).dot(surface.normal.as_dvec3()) > 0.0;
-    let n = if stays { bent } else { surface.normal };
+    let w = mirror(bent);
+    let stays = w.dot(surface.normal.as_dvec3()) > 0.0;
+    let (n, w) = if stays { (bent, w) } else { (surface.normal, mirror(surface.normal)) };
     let dn = smooth_differential(scene, surface, n, d);
-    leaving(scene, surface, mirror(n), d.reflect(v, n, dn), n, true)
+    leaving(scene, surface, w, d.reflect(v, n, dn), n, true)
 }
 
 /// The refracted ray for the ratio `eta` of [`SpecularWeights`]; at total internal reflection the grazing direction.
@@ -99,10 +100,11 @@ pub fn refracted(scene: &Scene, surface: &Surface, v: Vec3, d: &Differential, et
         v * eta - n * (eta * vn + root)
     };
     let bent = shading_towards(surface, v);
-    let stays = bend(bent).dot(surface.normal.as_dvec3()) < 0.0;
-    let n = if stays { bent } else { surface.normal };
+    let w = bend(bent);
+    let stays = w.dot(surface.normal.as_dvec3()) < 0.0;
+    let (n, w) = if stays { (bent, w) } else { (surface.normal, bend(surface.normal)) };
     let dn = smooth_differential(scene, surface, n, d);
-    leaving(scene, surface, bend(n), d.refract(v, n, dn, eta), n, false)
+    leaving(scene, surface, w, d.refract(v, n, dn, eta), n, false)
 }
 
 /// A ray that leaves along `w` by the normal `n`, before the surface or behind it.

@@ -42,12 +42,10 @@ impl Surface {
             let [wb, wc] = hit.weights;
             let normal = flat_normal([a, b, c]);
             let shading = match interpolated(g, index, hit.weights) {
-                Some(sum) if sum.length() < NO_NORMAL => {
-                    without_shading = true;
-                    normal
-                }
                 Some(sum) => {
-                    let n = sum.normalize();
+                    let length = sum.length();
+                    without_shading = length < NO_NORMAL;
+                    let n = if without_shading { normal } else { sum * (1.0 / length) };
                     if n.dot(normal) < 0.0 { -n } else { n }
                 }
                 None => normal,
@@ -96,8 +94,9 @@ impl Surface {
         let (Some(n), Some(sum)) = (corner_normals(g, index), interpolated(g, index, self.weights)) else {
             return [Vec3::ZERO; 2];
         };
-        let [a, b, c] = g.corners(index).map(|p| p.as_dvec3());
-        let [na, nb, nc] = n.map(|n| n.as_dvec3());
+        let [a, b, c] = g.corners(index);
+        let (a, b, c) = (a.as_dvec3(), b.as_dvec3(), c.as_dvec3());
+        let (na, nb, nc) = (n[0].as_dvec3(), n[1].as_dvec3(), n[2].as_dvec3());
         let (e1, e2) = (b - a, c - a);
         let area2 = e1.cross(e2);
         let scale = area2.length_squared();
@@ -137,8 +136,8 @@ pub const SELF_INTERSECTION: f32 = 2e-6;
 /// Unit normal of a triangle's front; f64 from the corners on, as the edges of a needle are nearly parallel and products
 /// of short ones vanish in f32. The y axis for one without area.
 pub fn flat_normal(corners: [Vec3; 3]) -> DVec3 {
-    let [a, b, c] = corners.map(|p| p.as_dvec3());
-    (b - a).cross(c - a).try_normalize().unwrap_or(DVec3::Y)
+    let a = corners[0].as_dvec3();
+    (corners[1].as_dvec3() - a).cross(corners[2].as_dvec3() - a).try_normalize().unwrap_or(DVec3::Y)
 }
 
 /// Unit normal of a sphere where a ray meets it near the distance `t`, whose last digits an f32 does not have.
@@ -157,14 +156,17 @@ fn sphere_normal(ray: &Ray, center: DVec3, radius: f64, t: f64) -> DVec3 {
 
 /// The normal interpolated between a triangle's corners, of any length; None for a flat triangle.
 fn interpolated(g: &Geometry, triangle: usize, weights: [f32; 2]) -> Option<DVec3> {
-    let [na, nb, nc] = corner_normals(g, triangle)?.map(|n| n.as_dvec3());
-    let [wb, wc] = weights.map(f64::from);
-    Some(na * (1.0 - wb - wc) + nb * wb + nc * wc)
+    let [na, nb, nc] = corner_normals(g, triangle)?;
+    let (wb, wc) = (f64::from(weights[0]), f64::from(weights[1]));
+    Some(na.as_dvec3() * (1.0 - wb - wc) + nb.as_dvec3() * wb + nc.as_dvec3() * wc)
 }
 
 fn corner_normals(g: &Geometry, triangle: usize) -> Option<[Vec3; 3]> {
-    let n = g.corner_normals[triangle];
-    (n[0] != NONE).then(|| n.map(|i| g.normals[i as usize]))
+    let [i, j, k] = g.corner_normals[triangle];
+    if i == NONE {
+        return None;
+    }
+    Some([g.normals[i as usize], g.normals[j as usize], g.normals[k as usize]])
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! A watertight ray-triangle test (Woop, Benthin and Wald 2013), in f64.
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 /// A ray sheared so that it runs along its longest axis; made once for each ray.
 ///
@@ -8,35 +8,32 @@ use glam::Vec3;
 /// not along an axis more than its width, and the hit slides along it.
 #[derive(Clone, Copy, Debug)]
 pub struct ShearedRay {
-    origin: [f64; 3],
-    axes: [usize; 3],
-    shear: [f64; 3],
-    /// Origin and shear along the two other axes in f32, for triangles that are clearly missed.
-    rough: ([f32; 3], [f32; 2]),
+    origin: DVec3,
+    /// Rows that take a point about the origin to its sheared coordinates across the ray. They have one entry 1 and one 0,
+    /// so that a product with them is rounded as a difference of two numbers is.
+    across: [DVec3; 2],
+    /// The longest axis, and that over the direction's component along it.
+    along: DVec3,
+    per_length: f64,
 }
-
-/// Error of an edge function in f32 over the product of what its corners' coordinates are made of: twenty roundings at most.
-const ROUGH: f32 = 16.0 * f32::EPSILON;
 
 impl ShearedRay {
     /// Prepares a ray; `direction` must be finite and not zero.
+    #[inline]
     pub fn new(origin: Vec3, direction: Vec3) -> Self {
-        let d = direction.as_dvec3().to_array();
+        let d = direction.as_dvec3();
         let a = direction.abs();
-        let kz = if a.x >= a.y && a.x >= a.z {
-            0
+        let (x, y, along) = if a.x >= a.y && a.x >= a.z {
+            (DVec3::Y, DVec3::Z, DVec3::X)
         } else if a.y >= a.z {
-            1
+            (DVec3::Z, DVec3::X, DVec3::Y)
         } else {
-            2
+            (DVec3::X, DVec3::Y, DVec3::Z)
         };
-        let (mut kx, mut ky) = ((kz + 1) % 3, (kz + 2) % 3);
-        if d[kz] < 0.0 {
-            std::mem::swap(&mut kx, &mut ky);
-        }
-        let shear = [d[kx] / d[kz], d[ky] / d[kz], 1.0 / d[kz]];
-        let rough = (origin.to_array(), [shear[0] as f32, shear[1] as f32]);
-        Self { origin: origin.as_dvec3().to_array(), axes: [kx, ky, kz], shear, rough }
+        let (x, y) = if d.dot(along) < 0.0 { (y, x) } else { (x, y) };
+        let per_length = 1.0 / d.dot(along);
+        let across = [x - along * (d.dot(x) * per_length), y - along * (d.dot(y) * per_length)];
+        Self { origin: origin.as_dvec3(), across, along, per_length }
     }
 
     /// Distance along the ray and the weights of the second and third corner, if the triangle is met from either
@@ -44,57 +41,30 @@ impl ShearedRay {
     /// the ray runs along, or that has no area, is not met.
     #[inline]
     pub fn intersect(&self, corners: &[Vec3; 3], t_max: f32) -> Option<(f32, f32, f32)> {
-        if self.clearly_misses(corners) {
-            return None;
-        }
-        let [kx, ky, kz] = self.axes;
-        let [sx, sy, sz] = self.shear;
-        let mut x = [0.0f64; 3];
-        let mut y = [0.0f64; 3];
-        let mut z = [0.0f64; 3];
-        for i in 0..3 {
-            let c = corners[i].to_array();
-            z[i] = f64::from(c[kz]) - self.origin[kz];
-            x[i] = (f64::from(c[kx]) - self.origin[kx]) - sx * z[i];
-            y[i] = (f64::from(c[ky]) - self.origin[ky]) - sy * z[i];
-        }
+        let [sx, sy] = self.across;
+        let [a, b, c] = [
+            corners[0].as_dvec3() - self.origin,
+            corners[1].as_dvec3() - self.origin,
+            corners[2].as_dvec3() - self.origin,
+        ];
+        let (ax, ay) = (sx.dot(a), sy.dot(a));
+        let (bx, by) = (sx.dot(b), sy.dot(b));
+        let (cx, cy) = (sx.dot(c), sy.dot(c));
         // The neighbour across an edge has exactly the negative of its function, so that one of both is met.
-        let u = x[2] * y[1] - y[2] * x[1];
-        let v = x[0] * y[2] - y[0] * x[2];
-        let w = x[1] * y[0] - y[1] * x[0];
-        if (u < 0.0 || v < 0.0 || w < 0.0) && (u > 0.0 || v > 0.0 || w > 0.0) {
+        let u = cx * by - cy * bx;
+        let v = ax * cy - ay * cx;
+        let w = bx * ay - by * ax;
+        if u.min(v).min(w) < 0.0 && u.max(v).max(w) > 0.0 {
             return None;
         }
         let det = u + v + w;
         if det == 0.0 {
             return None;
         }
-        let t = ((u * z[0] + v * z[1] + w * z[2]) * sz / det) as f32;
-        (t > 0.0 && t <= t_max).then(|| (t, (v / det) as f32, (w / det) as f32))
-    }
-
-    /// Whether two edge functions have different signs beyond any rounding of f32. Most triangles that a ray is tested
-    /// against are missed by far.
-    #[inline]
-    fn clearly_misses(&self, corners: &[Vec3; 3]) -> bool {
-        let [kx, ky, kz] = self.axes;
-        let (o, [sx, sy]) = self.rough;
-        let (mut x, mut y) = ([0.0f32; 3], [0.0f32; 3]);
-        let (mut across, mut down) = (0.0f32, 0.0f32);
-        for i in 0..3 {
-            let c = corners[i].to_array();
-            let (dx, dy, dz) = (c[kx] - o[kx], c[ky] - o[ky], c[kz] - o[kz]);
-            // Shears lie in [-1, 1].
-            x[i] = dx - sx * dz;
-            y[i] = dy - sy * dz;
-            across = across.max(dx.abs() + dz.abs());
-            down = down.max(dy.abs() + dz.abs());
-        }
-        let u = x[2] * y[1] - y[2] * x[1];
-        let v = x[0] * y[2] - y[0] * x[2];
-        let w = x[1] * y[0] - y[1] * x[0];
-        let doubt = ROUGH * across * down;
-        u.min(v).min(w) < -doubt && u.max(v).max(w) > doubt
+        let per_det = 1.0 / det;
+        let z = self.along;
+        let t = ((u * z.dot(a) + v * z.dot(b) + w * z.dot(c)) * (self.per_length * per_det)) as f32;
+        (t > 0.0 && t <= t_max).then(|| (t, (v * per_det) as f32, (w * per_det) as f32))
     }
 }
 

@@ -4,23 +4,47 @@ use crate::scene::Camera;
 use crate::trace::Differential;
 use glam::{DVec3, Vec3};
 
-impl Camera {
-    /// Unit direction through the point `(x, y)` of an image of `size` pixels, `y` down, and its differential
-    /// for half-steps of `half` pixels along x and y (Igehy 1999, eq. 8; Pedersen 2011, eq. 20).
+/// The view rays of a camera through an image: what all of them share is worked out once.
+///
+/// f64: across a narrow view directions differ in their last digits, and a wide one cancels at its corners.
+#[derive(Clone, Copy, Debug)]
+pub struct ViewRays {
+    /// Towards the image's upper left corner, at the distance 1 along the axis of view.
+    corner: DVec3,
+    /// A pixel to the right and a pixel down there.
+    steps: [DVec3; 2],
+}
+
+impl ViewRays {
+    /// Unit direction through the point `(x, y)` of the image, `y` down, and its differential for half-steps of `half`
+    /// pixels along x and y (Igehy 1999, eq. 8; Pedersen 2011, eq. 20).
     ///
     /// With `half = 0.5` the parallelogram `±dP₀ ± dP₁` at the hit covers one pixel.
-    pub fn ray(&self, x: f32, y: f32, size: [u32; 2], half: f32) -> (Vec3, Differential) {
-        // f64: across a narrow view directions differ in their last digits, and a wide one cancels at its corners.
+    #[inline]
+    pub fn ray(&self, x: f32, y: f32, half: f32) -> (Vec3, Differential) {
+        let [right, down] = self.steps;
+        let v = self.corner + right * f64::from(x) + down * f64::from(y);
+        let per_length = 1.0 / v.length();
+        let direction = v * per_length;
+        let half = f64::from(half) * per_length;
+        let along = |step: DVec3| ((step - direction * direction.dot(step)) * half).as_vec3();
+        (direction.as_vec3(), Differential { dp: [Vec3::ZERO; 2], dv: [along(right), along(down)] })
+    }
+}
+
+impl Camera {
+    /// The view rays through an image of `size` pixels.
+    pub fn rays(&self, size: [u32; 2]) -> ViewRays {
         let [right, up, forward] = self.frame.map(|v| v.as_dvec3());
         let [w, h] = size.map(f64::from);
         let step = 2.0 * f64::from(self.tan_half_fov_y) / h;
-        let v = forward + right * ((f64::from(x) - w / 2.0) * step) + up * ((h / 2.0 - f64::from(y)) * step);
-        let length = v.length();
-        let direction = v / length;
-        let half = f64::from(half) * step / length;
-        let along = |dx: DVec3| (direction.cross(dx).cross(direction) * half).as_vec3();
-        let dv = [along(right), along(-up)];
-        (direction.as_vec3(), Differential { dp: [Vec3::ZERO; 2], dv })
+        let corner = forward - right * (w / 2.0 * step) + up * (h / 2.0 * step);
+        ViewRays { corner, steps: [right * step, -up * step] }
+    }
+
+    /// One ray of [`Camera::rays`].
+    pub fn ray(&self, x: f32, y: f32, size: [u32; 2], half: f32) -> (Vec3, Differential) {
+        self.rays(size).ray(x, y, half)
     }
 
     /// Place in an image of `size` pixels where a point is seen, `y` down; None behind the camera.
