@@ -253,7 +253,8 @@ impl Exact {
     fn view<'a>(&'a self, pass: &'a Pass) -> ViewPass<'a> {
         let view = pass.view();
         let maps = self.maps.as_ref().unwrap_or(view.maps);
-        ViewPass { tracer: ViewTracer { plan: &self.plan, ..view.tracer }, maps, ..view }
+        let footprints = self.plan.view_differentials;
+        ViewPass { tracer: ViewTracer { plan: &self.plan, footprints, ..view.tracer }, maps, ..view }
     }
 }
 

@@ -106,6 +106,7 @@ impl Pass {
                 intersector: &self.intersector,
                 settings: &self.settings,
                 plan: &self.plan,
+                footprints: self.plan.view_differentials,
             },
             maps: &self.maps,
             pass: self.number,

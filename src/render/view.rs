@@ -81,6 +81,8 @@ pub struct ViewTracer<'a> {
     pub settings: &'a RenderSettings,
     /// The plan.
     pub plan: &'a Plan,
+    /// Whether footprints are carried: as the plan says, unless all who look at the hits look at points.
+    pub footprints: bool,
 }
 
 /// A surface that a view path meets.
@@ -151,6 +153,7 @@ impl ViewTracer<'_> {
     ) -> DVec3 {
         let mut radiance = DVec3::ZERO;
         stack.clear();
+        let differential = if self.footprints { differential } else { Differential::default() };
         stack.push(Branch { ray, differential, throughput: Rgb::ONE, medium: None, depth: 0, specular: 0 });
         while let Some(mut branch) = stack.pop() {
             let Some(hit) = self.intersector.closest(&branch.ray) else {
@@ -158,7 +161,7 @@ impl ViewTracer<'_> {
             };
             let surface = Surface::new(self.scene, &branch.ray, &hit);
             let v = branch.ray.direction;
-            if self.plan.view_differentials {
+            if self.footprints {
                 branch.differential = branch.differential.transfer(v, surface.normal, hit.t);
                 let bounded = branch.differential.bound(self.scene.radius, MAX_ANGLE);
                 counts.bounded.differentials += u64::from(bounded);

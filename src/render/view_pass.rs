@@ -1,5 +1,6 @@
 //! The view pass: tile by tile, the same photons under every estimator in turn.
 
+use crate::estimate::registry::needs_view_footprint;
 use crate::estimate::{Gathered, Lookup};
 use crate::math::hash::mix;
 use crate::math::rgb::{Rgb, in_f32};
@@ -222,7 +223,10 @@ impl ViewPass<'_> {
         let mut all_rays = 0.0;
         for n in rays {
             let start = Instant::now();
-            let base = self.trace(rect, n, scratch, &mut counts, &mut Unrecorded);
+            let mut by_n = slots.iter().filter(|s| s.estimator.rays_per_axis() == n);
+            let footprints = self.tracer.footprints && by_n.any(|s| needs_view_footprint(s.estimator));
+            let view = ViewPass { tracer: ViewTracer { footprints, ..self.tracer }, ..*self };
+            let base = view.trace(rect, n, scratch, &mut counts, &mut Unrecorded);
             let view_trace = start.elapsed().as_secs_f64();
             all_rays += view_trace;
             for k in 0..slots.len() {

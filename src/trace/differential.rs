@@ -19,6 +19,11 @@ pub struct Differential {
 }
 
 impl Differential {
+    /// Whether nothing changes with the parameters: a ray that carries no differential.
+    pub fn is_none(&self) -> bool {
+        *self == Self::default()
+    }
+
     /// Moves the origin along the unit direction `v` by `s` metres to a surface of unit normal `n`
     /// (Pedersen 2011, eq. 26 corrected). `dv` stays. At grazing incidence as long as it is, never infinite.
     pub fn transfer(&self, v: Vec3, n: Vec3, s: f32) -> Self {

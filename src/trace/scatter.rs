@@ -87,8 +87,8 @@ pub fn reflected(scene: &Scene, surface: &Surface, v: Vec3, d: &Differential) ->
     let w = mirror(bent);
     let stays = w.dot(surface.normal.as_dvec3()) > 0.0;
     let (n, w) = if stays { (bent, w) } else { (surface.normal, mirror(surface.normal)) };
-    let dn = smooth_differential(scene, surface, n, d);
-    leaving(scene, surface, w, d.reflect(v, n, dn), n, true)
+    let next = if d.is_none() { *d } else { d.reflect(v, n, smooth_differential(scene, surface, n, d)) };
+    leaving(scene, surface, w, next, n, true)
 }
 
 /// The refracted ray for the ratio `eta` of [`SpecularWeights`]; at total internal reflection the grazing direction.
@@ -103,8 +103,8 @@ pub fn refracted(scene: &Scene, surface: &Surface, v: Vec3, d: &Differential, et
     let w = bend(bent);
     let stays = w.dot(surface.normal.as_dvec3()) < 0.0;
     let (n, w) = if stays { (bent, w) } else { (surface.normal, bend(surface.normal)) };
-    let dn = smooth_differential(scene, surface, n, d);
-    leaving(scene, surface, w, d.refract(v, n, dn, eta), n, false)
+    let next = if d.is_none() { *d } else { d.refract(v, n, smooth_differential(scene, surface, n, d), eta) };
+    leaving(scene, surface, w, next, n, false)
 }
 
 /// A ray that leaves along `w` by the normal `n`, before the surface or behind it.

@@ -206,7 +206,7 @@ pub fn view_path(pass: &Pass, pixel: [u32; 2]) -> Result<Vec<PathVertex>, Inspec
     }
     let plan = Plan { view_differentials: true, shadow_rays: false, ..pass.plan.clone() };
     let own = pass.view();
-    let view = ViewPass { tracer: ViewTracer { plan: &plan, ..own.tracer }, ..own };
+    let view = ViewPass { tracer: ViewTracer { plan: &plan, footprints: true, ..own.tracer }, ..own };
     let mut account = Account { view: &view, slots: &[], hits: Vec::new(), path: Vec::new(), rows: BTreeMap::new() };
     account.add_rays(Rect { x: pixel[0], y: pixel[1], width: 1, height: 1 }, 1);
     Ok(account.path)
