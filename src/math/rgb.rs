@@ -22,6 +22,11 @@ pub fn in_f32(sum: DVec3) -> (Rgb, bool) {
     (Rgb::from_array(bounded), true)
 }
 
+/// Relative luminance with the Rec. 709 primaries.
+pub fn luminance(c: Rgb) -> f32 {
+    0.2126 * c.x + 0.7152 * c.y + 0.0722 * c.z
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -34,9 +39,4 @@ mod tests {
         assert_eq!(in_f32(DVec3::new(f64::NAN, 1.0, f64::NAN)), (Rgb::Y, true));
         assert_eq!(mean(Rgb::splat(f32::MAX)), f32::MAX);
     }
-}
-
-/// Relative luminance with the Rec. 709 primaries.
-pub fn luminance(c: Rgb) -> f32 {
-    0.2126 * c.x + 0.7152 * c.y + 0.0722 * c.z
 }

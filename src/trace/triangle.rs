@@ -64,7 +64,7 @@ impl ShearedRay {
         let per_det = 1.0 / det;
         let z = self.along;
         let t = ((u * z.dot(a) + v * z.dot(b) + w * z.dot(c)) * (self.per_length * per_det)) as f32;
-        (t > 0.0 && t <= t_max).then(|| (t, (v * per_det) as f32, (w * per_det) as f32))
+        (t > 0.0 && t <= t_max).then_some((t, (v * per_det) as f32, (w * per_det) as f32))
     }
 }
 

@@ -23,7 +23,7 @@ impl CarriedWeight {
     fn mean(&self, photon: &MapPhoton, view: &View) -> f64 {
         let c = photon.to_filter(view.query.center - photon.position);
         let [a, b] = view.query.axes.map(|v| photon.to_filter(v));
-        f64::from(self.inner.mean(c, a, b))
+        self.inner.mean(c, a, b)
     }
 }
 
@@ -149,9 +149,9 @@ mod tests {
         let (v, all) = (view(0.0), Gathered { photons: map.photons(), indices: &[0, 1], radius: 0.0 });
         let (one, two) = (std::f64::consts::PI, std::f64::consts::PI * 0.01);
         let expected = 3.0 / one + 3.0 * 0.25 / two;
-        assert!((f64::from(e.irradiance(&all, &v).x) / expected - 1.0).abs() < 1e-5);
+        assert!((e.irradiance(&all, &v).x / expected - 1.0).abs() < 1e-5);
         let reset = MultiSampled::new(2, Grid::Closed).irradiance(&all, &v);
-        assert!((f64::from(reset.x) / (3.0 / one) - 1.0).abs() < 1e-5);
+        assert!((reset.x / (3.0 / one) - 1.0).abs() < 1e-5);
     }
 
     /// Two unit squares whose ellipse and parallelogram meet at a distance between √2 and 2 overlap, yet are missed.
