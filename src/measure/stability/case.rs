@@ -1,6 +1,11 @@
 //! A stability case, what came of it, and the verdict.
 
+use super::oracle::random::Random;
+use rayon::prelude::*;
 use std::time::Instant;
+
+/// Rounding of f32: what is stored in it afterwards need not be better.
+pub const F32: f64 = f32::EPSILON as f64;
 
 /// Something stiff or extreme, and how exactly it must come out.
 #[derive(Clone, Copy)]
@@ -89,6 +94,20 @@ impl Outcome {
         self.failure = self.failure.or(other.failure);
         self
     }
+}
+
+/// The outcome of `each` for the numbers below `count`, each with a stream of random numbers of its own.
+pub(super) fn many(name: &str, count: u64, each: impl Fn(u64, &mut Random, &mut Outcome) + Sync) -> Outcome {
+    const PART: u64 = 512;
+    (0..count.div_ceil(PART))
+        .into_par_iter()
+        .map(|part| {
+            let mut outcome = Outcome::default();
+            let numbers = part * PART..(part * PART + PART).min(count);
+            numbers.for_each(|i| each(i, &mut Random::new(name, i), &mut outcome));
+            outcome
+        })
+        .reduce(Outcome::default, Outcome::and)
 }
 
 /// Whether a case holds.

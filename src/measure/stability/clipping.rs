@@ -1,15 +1,12 @@
 //! The kernel over polygon ∩ disc, and footprints clipped by polygons, where shapes touch.
 
+use super::case::{F32, many};
 use super::oracle::footprint::{largest_mean, mean_over};
 use super::oracle::random::Random;
 use super::oracle::scan::kernel_over;
 use super::{Case, Outcome};
 use crate::estimate::polygon::{integral_over_polygon, mean_over_parallelogram};
 use glam::{DVec2, DVec3, Vec3};
-use rayon::prelude::*;
-
-/// What is stored in f32 afterwards need not be better.
-const F32: f64 = f32::EPSILON as f64;
 
 /// The group.
 pub const CASES: &[Case] = &[
@@ -53,42 +50,35 @@ fn hair(random: &mut Random) -> f64 {
 
 fn polygon_disc() -> Outcome {
     let whole = std::f64::consts::PI / 3.0;
-    (0..20_000u64)
-        .into_par_iter()
-        .map(|i| {
-            let mut random = Random::new("polygon-disc", i);
-            let mut outcome = Outcome::default();
-            let corners = 3 + (random.unit() * 6.0) as usize;
-            let mut angles: Vec<f64> = (0..corners).map(|_| random.range(0.0, std::f64::consts::TAU)).collect();
-            angles.sort_by(f64::total_cmp);
-            let polygon: Vec<DVec2> = match i % 4 {
-                // Inscribed but for hairs. Convex, as hairs of 0.1 between near angles would not be.
-                0 => {
-                    let scale = hair(&mut random);
-                    angles.iter().map(|a| DVec2::from_angle(*a) * scale).collect()
-                }
-                // A triangle with each vertex at its own hair.
-                1 => angles[..3].iter().map(|a| DVec2::from_angle(*a) * hair(&mut random)).collect(),
-                // A square whose edges are tangent, or nearly, and which lies anywhere along them.
-                2 => {
-                    let (h, x) = (hair(&mut random), DVec2::from_angle(angles[0]));
-                    let size = random.decade(-3.0, 2.0);
-                    let along = random.range(-2.0, 2.0);
-                    let from = x * h + x.perp() * along;
-                    vec![from, from + x.perp() * size, from + (x.perp() + x) * size, from + x * size]
-                }
-                // The disc inside, or the polygon inside, or neither.
-                _ => {
-                    let (size, center) =
-                        (random.decade(-4.0, 2.0), DVec2::from_angle(angles[1]) * random.range(0.0, 1.5));
-                    angles.iter().map(|a| center + DVec2::from_angle(*a) * size).collect()
-                }
-            };
-            let (found, exact) = (integral_over_polygon(&polygon), kernel_over(&polygon));
-            outcome.see((found - exact).abs() / whole, || format!("{polygon:?}: {found:e} for {exact:e}"));
-            outcome
-        })
-        .reduce(Outcome::default, Outcome::and)
+    many("polygon-disc", 20_000, |i, random, outcome| {
+        let corners = 3 + (random.unit() * 6.0) as usize;
+        let mut angles: Vec<f64> = (0..corners).map(|_| random.range(0.0, std::f64::consts::TAU)).collect();
+        angles.sort_by(f64::total_cmp);
+        let polygon: Vec<DVec2> = match i % 4 {
+            // Inscribed but for hairs. Convex, as hairs of 0.1 between near angles would not be.
+            0 => {
+                let scale = hair(random);
+                angles.iter().map(|a| DVec2::from_angle(*a) * scale).collect()
+            }
+            // A triangle with each vertex at its own hair.
+            1 => angles[..3].iter().map(|a| DVec2::from_angle(*a) * hair(random)).collect(),
+            // A square whose edges are tangent, or nearly, and which lies anywhere along them.
+            2 => {
+                let (h, x) = (hair(random), DVec2::from_angle(angles[0]));
+                let size = random.decade(-3.0, 2.0);
+                let along = random.range(-2.0, 2.0);
+                let from = x * h + x.perp() * along;
+                vec![from, from + x.perp() * size, from + (x.perp() + x) * size, from + x * size]
+            }
+            // The disc inside, or the polygon inside, or neither.
+            _ => {
+                let (size, center) = (random.decade(-4.0, 2.0), DVec2::from_angle(angles[1]) * random.range(0.0, 1.5));
+                angles.iter().map(|a| center + DVec2::from_angle(*a) * size).collect()
+            }
+        };
+        let (found, exact) = (integral_over_polygon(&polygon), kernel_over(&polygon));
+        outcome.see((found - exact).abs() / whole, || format!("{polygon:?}: {found:e} for {exact:e}"));
+    })
 }
 
 fn judged(c: Vec3, a: Vec3, b: Vec3, outcome: &mut Outcome) {
@@ -107,51 +97,39 @@ fn frame(random: &mut Random) -> [DVec3; 3] {
 }
 
 fn parallelogram_disc() -> Outcome {
-    (0..40_000u64)
-        .into_par_iter()
-        .map(|i| {
-            let mut random = Random::new("parallelogram-disc", i);
-            let mut outcome = Outcome::default();
-            let [x, y, n] = frame(&mut random);
-            let (p, q) = (random.decade(-6.0, 6.0), random.decade(-6.0, 6.0));
-            let skew = random.range(-1.0, 1.0);
-            let (a, b) = (x * p, (y + x * skew) * q);
-            let reach = hair(&mut random);
-            let off = n * if i % 5 == 0 { hair(&mut random) } else { random.range(-1.1, 1.1) * (i % 2) as f64 };
-            let c = match i % 3 {
-                // A vertex at a hair from the circle; an edge nearly tangent; anywhere.
-                0 => a + b + (x + y * random.range(-1.0, 1.0)).normalize() * reach,
-                1 => b + y * reach + x * random.range(-1.0, 1.0) * p,
-                _ => a * random.range(-1.2, 1.2) + b * random.range(-1.2, 1.2),
-            };
-            judged((c + off).as_vec3(), a.as_vec3(), b.as_vec3(), &mut outcome);
-            outcome
-        })
-        .reduce(Outcome::default, Outcome::and)
+    many("parallelogram-disc", 40_000, |i, random, outcome| {
+        let [x, y, n] = frame(random);
+        let (p, q) = (random.decade(-6.0, 6.0), random.decade(-6.0, 6.0));
+        let skew = random.range(-1.0, 1.0);
+        let (a, b) = (x * p, (y + x * skew) * q);
+        let reach = hair(random);
+        let off = n * if i % 5 == 0 { hair(random) } else { random.range(-1.1, 1.1) * (i % 2) as f64 };
+        let c = match i % 3 {
+            // A vertex at a hair from the circle; an edge nearly tangent; anywhere.
+            0 => a + b + (x + y * random.range(-1.0, 1.0)).normalize() * reach,
+            1 => b + y * reach + x * random.range(-1.0, 1.0) * p,
+            _ => a * random.range(-1.2, 1.2) + b * random.range(-1.2, 1.2),
+        };
+        judged((c + off).as_vec3(), a.as_vec3(), b.as_vec3(), outcome);
+    })
 }
 
 fn parallelogram_sliver() -> Outcome {
-    (0..40_000u64)
-        .into_par_iter()
-        .map(|i| {
-            let mut random = Random::new("parallelogram-sliver", i);
-            let mut outcome = Outcome::default();
-            let [x, y, n] = frame(&mut random);
-            let long = random.decade(-3.0, 3.0);
-            let a = x * long;
-            let b = match i % 4 {
-                0 => y * (long * random.decade(-8.0, 0.0)),
-                1 => DVec3::ZERO,
-                // Parallel but for an angle.
-                2 => (x + y * random.decade(-8.0, -3.0)) * (long * random.range(-1.0, 1.0)),
-                _ => y * (long * random.decade(-8.0, -3.0)) + n * (long * random.decade(-8.0, -3.0)),
-            };
-            let a = if i % 16 == 1 { DVec3::ZERO } else { a };
-            let c = a * random.range(-1.2, 1.2) + y * random.range(-1.1, 1.1) + n * random.range(-0.5, 0.5);
-            judged(c.as_vec3(), a.as_vec3(), b.as_vec3(), &mut outcome);
-            outcome
-        })
-        .reduce(Outcome::default, Outcome::and)
+    many("parallelogram-sliver", 40_000, |i, random, outcome| {
+        let [x, y, n] = frame(random);
+        let long = random.decade(-3.0, 3.0);
+        let a = x * long;
+        let b = match i % 4 {
+            0 => y * (long * random.decade(-8.0, 0.0)),
+            1 => DVec3::ZERO,
+            // Parallel but for an angle.
+            2 => (x + y * random.decade(-8.0, -3.0)) * (long * random.range(-1.0, 1.0)),
+            _ => y * (long * random.decade(-8.0, -3.0)) + n * (long * random.decade(-8.0, -3.0)),
+        };
+        let a = if i % 16 == 1 { DVec3::ZERO } else { a };
+        let c = a * random.range(-1.2, 1.2) + y * random.range(-1.1, 1.1) + n * random.range(-0.5, 0.5);
+        judged(c.as_vec3(), a.as_vec3(), b.as_vec3(), outcome);
+    })
 }
 
 #[cfg(test)]

@@ -1,5 +1,6 @@
 //! Ray differentials, operation by operation, from normal to grazing incidence and at the critical angle.
 
+use super::case::{F32, many};
 use super::oracle::dual::{Dual, Dual3};
 use super::oracle::random::Random;
 use super::scenes::{MIRROR, glass, meet, mesh, scene};
@@ -11,10 +12,7 @@ use crate::scene::{Camera, Geometry, Light};
 use crate::trace::scatter::{fresnel, reflected, refracted, specular_weights};
 use crate::trace::{Differential, Intersector, Ray};
 use glam::{DVec3, Vec3};
-use rayon::prelude::*;
 
-/// What is stored in f32 afterwards need not be better.
-const F32: f64 = f32::EPSILON as f64;
 /// Two directions in f32 and what is made of them.
 const DIRECTIONS: f64 = 4.0 * F32;
 /// Distance and angle that differentials are bounded to in these cases.
@@ -115,18 +113,6 @@ pub const CASES: &[Case] = &[
     },
 ];
 
-/// Runs `one` for each number, each with a stream of its own.
-fn all(name: &'static str, count: u64, one: impl Fn(u64, &mut Random, &mut Outcome) + Sync) -> Outcome {
-    (0..count.div_ceil(512))
-        .into_par_iter()
-        .map(|part| {
-            let mut outcome = Outcome::default();
-            (part * 512..(part * 512 + 512).min(count)).for_each(|i| one(i, &mut Random::new(name, i), &mut outcome));
-            outcome
-        })
-        .reduce(Outcome::default, Outcome::and)
-}
-
 /// A vector across the unit vector `v`, of that length.
 fn across(v: DVec3, length: f64, random: &mut Random) -> Vec3 {
     (v.cross(random.direction()).normalize_or(v.any_orthonormal_vector()) * length).as_vec3()
@@ -151,7 +137,7 @@ fn angle(i: u64, random: &mut Random) -> f64 {
 }
 
 fn transfer() -> Outcome {
-    all("transfer", 200_000, |i, random, outcome| {
+    many("transfer", 200_000, |i, random, outcome| {
         let (v, n) = incident(angle(i, random), random);
         let (vd, nd) = units(v, n);
         if vd.dot(nd) > -1e-8 {
@@ -171,7 +157,7 @@ fn transfer() -> Outcome {
 }
 
 fn grazing() -> Outcome {
-    all("grazing", 50_000, |i, random, outcome| {
+    many("grazing", 50_000, |i, random, outcome| {
         let (v, n) = incident(if i % 5 == 0 { 0.0 } else { random.decade(-40.0, -6.0) }, random);
         let odd = [f32::MAX, f32::INFINITY, f32::NEG_INFINITY, f32::NAN, 1e-45, 1.0];
         let mut d = Differential {
@@ -205,7 +191,7 @@ fn changes(v: DVec3, n: DVec3, random: &mut Random) -> (Vec3, Vec3) {
 }
 
 fn reflect() -> Outcome {
-    all("reflect", 200_000, |i, random, outcome| {
+    many("reflect", 200_000, |i, random, outcome| {
         let (v, n) = incident(angle(i, random), random);
         let (vd, nd) = units(v, n);
         let (dv, dn) = changes(vd, nd, random);
@@ -219,7 +205,7 @@ fn reflect() -> Outcome {
 }
 
 fn refract() -> Outcome {
-    all("refract", 200_000, |i, random, outcome| {
+    many("refract", 200_000, |i, random, outcome| {
         let eta = random.range(1.0, 3.0);
         let eta = (if i % 4 < 2 { 1.0 / eta } else { eta }) as f32;
         // By the angle of incidence, or by the cosine behind the surface.
@@ -271,7 +257,7 @@ fn total_reflection() -> Outcome {
     let scene = scene(mesh(quad.into(), vec![[0, 1, 2], [0, 2, 3]]), glass(1.5), 1.0);
     let intersector = Intersector::new(&scene.geometry, scene.radius);
     let critical = libm::asin(1.0 / 1.5);
-    all("total-reflection", 100_000, |i, random, outcome| {
+    many("total-reflection", 100_000, |i, random, outcome| {
         let side = if i.is_multiple_of(2) { 1.0 } else { -1.0 };
         let (theta, up) = match i % 8 {
             // From outside, to grazing incidence.
@@ -321,7 +307,7 @@ fn total_reflection() -> Outcome {
 }
 
 fn camera() -> Outcome {
-    all("camera", 100_000, |i, random, outcome| {
+    many("camera", 100_000, |i, random, outcome| {
         let forward = random.direction();
         let right = forward.cross(random.direction()).normalize_or(forward.any_orthonormal_vector());
         let up = right.cross(forward);
@@ -350,7 +336,7 @@ fn camera() -> Outcome {
 fn emission() -> Outcome {
     use std::f64::consts::{PI, TAU};
     let scene = scene(mesh(Vec::new(), Vec::new()), MIRROR, 1.0);
-    all("emission", 60_000, |i, random, outcome| {
+    many("emission", 60_000, |i, random, outcome| {
         let count = random.decade(0.0, 9.0) as u64 + 1;
         let axis = random.direction().as_vec3();
         let x = [0; 4].map(|_| random.unit() as f32).map(|x| x.min(1.0 - f32::EPSILON));
@@ -402,7 +388,7 @@ fn emission() -> Outcome {
 }
 
 fn diffuse_bounce() -> Outcome {
-    all("diffuse-bounce", 100_000, |i, random, outcome| {
+    many("diffuse-bounce", 100_000, |i, random, outcome| {
         let (w, n) = incident(angle(i, random), random);
         let w = -w;
         let size = random.decade(-20.0, 10.0);
@@ -463,7 +449,7 @@ fn smooth(aspect: f64, spread: f64, random: &mut Random) -> Geometry {
 }
 
 fn smooth_normal() -> Outcome {
-    all("smooth-normal", 40_000, |i, random, outcome| {
+    many("smooth-normal", 40_000, |i, random, outcome| {
         let aspect = if i.is_multiple_of(2) { random.decade(0.0, 4.0) } else { 1.0 };
         let scene = scene(smooth(aspect, std::f64::consts::FRAC_PI_3, random), MIRROR, 1.0);
         let intersector = Intersector::new(&scene.geometry, scene.radius);
@@ -502,7 +488,7 @@ fn smooth_normal() -> Outcome {
 }
 
 fn horizon() -> Outcome {
-    all("horizon", 60_000, |i, random, outcome| {
+    many("horizon", 60_000, |i, random, outcome| {
         let mut geometry = smooth(1.0, std::f64::consts::FRAC_PI_2, random);
         let cancels = i % 7 == 0;
         if cancels {

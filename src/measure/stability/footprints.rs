@@ -1,7 +1,9 @@
 //! Photon footprints without width, without size and in any place, and what the estimators make of them.
 
+use super::case::{F32, many};
 use super::oracle::convex::covered;
 use super::oracle::footprint::{largest_mean, mean_over};
+use super::oracle::quadrature::integral;
 use super::oracle::random::Random;
 use super::oracle::svd::Ellipse;
 use super::{Case, Outcome};
@@ -12,11 +14,7 @@ use crate::photons::footprint::FilterTransform;
 use crate::photons::map::{FootprintLimits, MapParts, Query};
 use crate::photons::{MapPhoton, Photon, PhotonMap};
 use glam::{DVec2, DVec3, Vec3};
-use rayon::prelude::*;
 use std::f64::consts::PI;
-
-/// What is stored in f32 afterwards need not be better.
-const F32: f64 = f32::EPSILON as f64;
 
 /// The group.
 pub const CASES: &[Case] = &[
@@ -55,6 +53,15 @@ pub const CASES: &[Case] = &[
         oracle: "the kernel in f64",
         limit: 8.0 * F32,
         run: regular_weight,
+    },
+    Case {
+        group: "footprints",
+        name: "weights-on-a-disc",
+        what: "density's weight with each kernel; error relative to its mean over the disc",
+        range: "discs of 1e-9 to 1e9 m, photons from the centre to the rim and on it",
+        oracle: "the kernels' formulas (Jensen 2001; Silverman 1986), normalised by quadrature, f64",
+        limit: 16.0 * F32,
+        run: disc_weight,
     },
     Case {
         group: "footprints",
@@ -120,18 +127,8 @@ fn in_plane(axes: [Vec3; 2], n: Vec3) -> [DVec3; 2] {
     axes.map(|c| c.as_dvec3() - n * n.dot(c.as_dvec3()))
 }
 
-fn many(name: &'static str, count: u64, each: impl Fn(&mut Random, u64, &mut Outcome) + Sync) -> Outcome {
-    (0..count)
-        .into_par_iter()
-        .fold(Outcome::default, |mut outcome, i| {
-            each(&mut Random::new(name, i), i, &mut outcome);
-            outcome
-        })
-        .reduce(Outcome::default, Outcome::and)
-}
-
 fn ellipse() -> Outcome {
-    many("ellipse", 100_000, |random, i, outcome| {
+    many("ellipse", 100_000, |i, random, outcome| {
         let n = random.direction().as_vec3();
         let (floor, ceiling) = (1e-13f32, 1e7f32);
         let long = random_length(random);
@@ -177,7 +174,7 @@ fn random_length(random: &mut Random) -> f64 {
 }
 
 fn filter_point() -> Outcome {
-    many("filter-point", 100_000, |random, i, outcome| {
+    many("filter-point", 100_000, |i, random, outcome| {
         let n = random.direction().as_vec3();
         let aspect = random.decade(0.0, 12.0);
         let long = random.decade(-3.0, 3.0);
@@ -222,7 +219,7 @@ fn mapped(position: Vec3, footprint: [Vec3; 2], normal: Vec3, limits: FootprintL
 const OPEN: FootprintLimits = FootprintLimits { scale: 1.0, floor: 1e-18, ceiling: 1e12 };
 
 fn own_axes() -> Outcome {
-    many("own-axes", 100_000, |random, _, outcome| {
+    many("own-axes", 100_000, |_, random, outcome| {
         let n = random.direction().as_vec3();
         let (long, aspect) = (random.decade(-6.0, 3.0), random.decade(0.0, 6.0));
         let axes = footprint(random, n.as_dvec3(), long, aspect);
@@ -244,7 +241,7 @@ fn own_axes() -> Outcome {
 
 fn regular_weight() -> Outcome {
     let Ok(regular) = estimator("regular") else { return Outcome::default() };
-    many("weights-at-a-point", 50_000, |random, _, outcome| {
+    many("weights-at-a-point", 50_000, |_, random, outcome| {
         let axes = [Vec3::X, Vec3::Y];
         let photon = mapped(Vec3::ZERO, axes, Vec3::Z, OPEN);
         let r = 1.0 - random.decade(-8.0, 0.0);
@@ -259,8 +256,37 @@ fn view(center: Vec3, axes: [Vec3; 2], normal: Vec3, direction: Vec3) -> View {
     View { query: Query { center, normal, axes }, direction }
 }
 
+/// The kernels as their sources have them, functions of distance over radius, not normalised.
+const DISC_KERNELS: [(&str, fn(f64) -> f64); 5] = [
+    ("none", |_| 1.0),
+    ("cone", |r| 1.0 - r),
+    ("gaussian", |r| 1.0 - (1.0 - libm::exp(-1.953 * r * r / 2.0)) / (1.0 - libm::exp(-1.953))),
+    ("epanechnikov", |r| 1.0 - r * r),
+    ("silverman", |r| (1.0 - r * r).powi(2)),
+];
+
+fn disc_weight() -> Outcome {
+    DISC_KERNELS
+        .iter()
+        .map(|&(name, shape)| {
+            let Ok(density) = estimator(&format!("density:kernel={name}")) else { return Outcome::default() };
+            let whole = 2.0 * PI * integral(&|r| shape(r) * r, 0.0, 1.0, 1e-15);
+            many("weights-on-a-disc", 10_000, |i, random, outcome| {
+                let radius = random.decade(-9.0, 9.0) as f32;
+                let photon = mapped(Vec3::ZERO, [Vec3::X, Vec3::Y], Vec3::Z, OPEN);
+                let r = if i % 10 == 0 { 1.0 } else { random.unit() };
+                let x = (DVec2::from_angle(random.range(0.0, 6.3)) * (r * f64::from(radius))).as_vec2().extend(0.0);
+                let (area, along) = (f64::from(radius).powi(2), x.as_dvec3().length() / f64::from(radius));
+                let weight = density.weight(&photon, &view(x, [Vec3::ZERO; 2], Vec3::Z, Vec3::NEG_Z), radius);
+                let exact = shape(along.min(1.0)) / (whole * area);
+                outcome.see((weight - exact).abs() * PI * area, || format!("{name}, radius {radius:e} at {along}"));
+            })
+        })
+        .fold(Outcome::default(), Outcome::and)
+}
+
 fn sampled_weight() -> Outcome {
-    many("weights-of-points", 4_000, |random, i, outcome| {
+    many("weights-of-points", 4_000, |i, random, outcome| {
         let grid = if i % 2 == 0 { Grid::Closed } else { Grid::Cells };
         let n = 2u32 << (random.unit() * 7.0).min(7.0) as u32;
         let size = random.decade(-6.0, 3.0);
@@ -289,7 +315,7 @@ fn sampled_weight() -> Outcome {
 
 fn integrated_weight() -> Outcome {
     let Ok(integrated) = estimator("integrated") else { return Outcome::default() };
-    many("integrated", 40_000, |random, i, outcome| {
+    many("integrated", 40_000, |i, random, outcome| {
         let n = random.direction();
         let (long, aspect) = (random.decade(-5.0, 0.0), random.decade(0.0, if i % 2 == 0 { 2.0 } else { 6.6 }));
         let aspect = aspect.min(long / 2.4e-7).max(1.0);
@@ -333,7 +359,7 @@ fn integrated_weight() -> Outcome {
 }
 
 fn coverage() -> Outcome {
-    many("coverage", 20_000, |random, i, outcome| {
+    many("coverage", 20_000, |i, random, outcome| {
         let corners = [4, 3, 5, 8, 20][(i % 5) as usize];
         // Outward normals and distances of the polygon's edges.
         let (planes, normals): (_, Vec<(DVec2, f64)>) = if corners == 4 {
@@ -367,7 +393,7 @@ fn coverage() -> Outcome {
 }
 
 fn projection() -> Outcome {
-    many("projection", 60_000, |random, i, outcome| {
+    many("projection", 60_000, |i, random, outcome| {
         let n = random.direction().as_vec3();
         let long = random.decade(-3.0, 0.0);
         let axes = footprint(random, n.as_dvec3(), long, 1.0);
@@ -402,7 +428,7 @@ fn any_weight() -> Outcome {
     let extra = ["coplanar:shape=ellipse:20,weight=mean", "multi_sampled:n=5,grid=cells", "coplanar:weight=mean"];
     let names = ESTIMATORS.iter().map(|e| e.id).chain(extra);
     let all: Vec<Box<dyn Estimator>> = names.filter_map(|name| estimator(name).ok()).collect();
-    many("any-weight", 40_000, |random, i, outcome| {
+    many("any-weight", 40_000, |i, random, outcome| {
         let n = random.direction();
         let size = |random: &mut Random| match (random.unit() * 6.0) as u32 {
             0 => 0.0,

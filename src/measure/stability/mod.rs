@@ -8,6 +8,7 @@ mod scenes;
 
 mod chains;
 mod clipping;
+mod counts;
 mod differentials;
 mod footprints;
 mod passes;
@@ -27,6 +28,7 @@ pub fn cases() -> Vec<Case> {
         chains::CASES,
         watertight::CASES,
         units::CASES,
+        counts::CASES,
         powers::CASES,
         passes::CASES,
     ]

@@ -6,7 +6,7 @@ use crate::render::watch::Silent;
 use crate::render::{RenderSettings, Renderer};
 use crate::scene::scene_file::RenderFile;
 use crate::scene::source::Files;
-use crate::scene::{Scene, SceneError, load};
+use crate::scene::{Scene, SceneError, load, source};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -55,4 +55,42 @@ pub fn finite_films(renderer: &Renderer, outcome: &mut Outcome) {
             outcome.finite(p.to_array().map(f64::from), || format!("{}, pixel {i}: {p}", e.name()));
         }
     }
+}
+
+/// A floor seen from above in 16 by 16 pixels, lit by a beam.
+pub const BEAM: &str = r#"
+[camera]
+position = [0.0, 4.0, 0.0]
+target = [0.0, 0.0, 0.0]
+up = [0.0, 0.0, -1.0]
+fov_y = 40.0
+resolution = [16, 16]
+[materials.floor]
+kind = "diffuse"
+reflectance = [0.5, 0.5, 0.5]
+[[shapes]]
+kind = "quad"
+center = [0.0, 0.0, 0.0]
+u = [4.0, 0.0, 0.0]
+v = [0.0, 0.0, -4.0]
+material = "floor"
+[[lights]]
+kind = "spot"
+position = [0.0, 1e-5, 0.0]
+direction = [0.0, -1.0, 0.0]
+cone = 1.0
+falloff = 0.0
+power = [7.0, 7.0, 7.0]
+"#;
+
+/// Every estimator, with the settings that differ.
+pub const ALL: &str = "density,regular,regular_3x3,coplanar,coplanar:shape=ellipse:20,weight=mean,multi_sampled,\
+    multi_sampled:n=8,grid=cells,integrated";
+
+/// A built-in scene.
+///
+/// # Errors
+/// A defect of the binary.
+pub fn built_in(name: &str) -> Result<Scene, String> {
+    source::open(name).map_err(|e| e.to_string())
 }

@@ -1,5 +1,6 @@
 //! Rays at closed meshes through their edges and vertices, and against every triangle in f64.
 
+use super::case::F32;
 use super::oracle::random::Random;
 use super::scenes::{MIRROR, mesh, scene};
 use super::{Case, Outcome};
@@ -8,9 +9,6 @@ use crate::trace::{Hit, Intersector, Ray, Surface};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
-
-/// What is stored in f32 afterwards need not be better.
-const F32: f64 = f32::EPSILON as f64;
 
 /// The group.
 pub const CASES: &[Case] = &[
