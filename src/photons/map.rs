@@ -13,26 +13,27 @@ use rayon::prelude::*;
 /// Keeps photons of the far side of an edge out of a hit, and lets a smooth surface bend within a footprint.
 pub const NORMAL_AGREEMENT: f32 = 0.5;
 
-/// A photon of a map, ready to be evaluated.
+/// A photon of a map, ready to be evaluated. What a gather looks at comes first, in 64 bytes.
 #[derive(Clone, Copy, Debug)]
+#[repr(C)]
 pub struct MapPhoton {
     /// Where it arrived, metres.
     pub position: Vec3,
-    /// 1/A, 1/m².
-    pub inverse_area: f32,
+    /// Inverse of the longest semi-axis, 1/metre.
+    pub inverse_reach: f32,
     /// First two rows of the filter transform, 1/metre, as [`FilterTransform`] has them; the third is the normal over the
     /// longest semi-axis.
     pub rows: [Vec3; 2],
-    /// Cosine and sine of the turn from filter coordinates to those in `dα` and `dβ`.
-    pub turn: Vec2,
-    /// Inverse of the longest semi-axis, 1/metre.
-    pub inverse_reach: f32,
-    /// Power, W.
-    pub power: Rgb,
     /// Unit normal of its surface.
     pub normal: Vec3,
     /// Unit direction in which it travelled.
     pub direction: Vec3,
+    /// Power, W.
+    pub power: Rgb,
+    /// 1/A, 1/m².
+    pub inverse_area: f32,
+    /// Cosine and sine of the turn from filter coordinates to those in `dα` and `dβ`.
+    pub turn: Vec2,
 }
 
 impl MapPhoton {
