@@ -256,19 +256,27 @@ fn view(center: Vec3, axes: [Vec3; 2], normal: Vec3, direction: Vec3) -> View {
     View { query: Query { center, normal, axes }, direction }
 }
 
-/// The kernels as their sources have them, functions of distance over radius, not normalised.
-const DISC_KERNELS: [(&str, fn(f64) -> f64); 5] = [
-    ("none", |_| 1.0),
-    ("cone", |r| 1.0 - r),
-    ("gaussian", |r| 1.0 - (1.0 - libm::exp(-1.953 * r * r / 2.0)) / (1.0 - libm::exp(-1.953))),
-    ("epanechnikov", |r| 1.0 - r * r),
-    ("silverman", |r| (1.0 - r * r).powi(2)),
+/// A kernel as its source has it, a function of distance over radius that is not normalised.
+struct DiscKernel {
+    name: &'static str,
+    shape: fn(f64) -> f64,
+}
+
+const DISC_KERNELS: [DiscKernel; 5] = [
+    DiscKernel { name: "none", shape: |_| 1.0 },
+    DiscKernel { name: "cone", shape: |r| 1.0 - r },
+    DiscKernel {
+        name: "gaussian",
+        shape: |r| 1.0 - (1.0 - libm::exp(-1.953 * r * r / 2.0)) / (1.0 - libm::exp(-1.953)),
+    },
+    DiscKernel { name: "epanechnikov", shape: |r| 1.0 - r * r },
+    DiscKernel { name: "silverman", shape: |r| (1.0 - r * r).powi(2) },
 ];
 
 fn disc_weight() -> Outcome {
     DISC_KERNELS
         .iter()
-        .map(|&(name, shape)| {
+        .map(|&DiscKernel { name, shape }| {
             let Ok(density) = estimator(&format!("density:kernel={name}")) else { return Outcome::default() };
             let whole = 2.0 * PI * integral(&|r| shape(r) * r, 0.0, 1.0, 1e-15);
             many("weights-on-a-disc", 10_000, |i, random, outcome| {
