@@ -106,9 +106,12 @@ impl Bounded {
     /// The notes as one line each.
     pub fn lines(&self) -> Vec<String> {
         let mut lines: Vec<String> =
-            self.notes().iter().map(|(count, what, how)| format!("bounded: {count} {what} {how}")).collect();
+            self.notes().iter().map(|(count, what, how)| format!("bounded: {what} {how}: {count}")).collect();
         if self.cut_off_power > 0.0 {
-            lines.push(format!("bounded: photons of {:.4e} W a pass ended by the bounce limit", self.cut_off_power));
+            lines.push(format!(
+                "bounded: power that the bounce limit ended, W for each pass: {:.4e}",
+                self.cut_off_power
+            ));
         }
         lines
     }
@@ -133,8 +136,9 @@ mod tests {
         let bounded = Bounded { views, overflow: 2, cut_off_power: 1.5, ..Default::default() };
         let lines = bounded.lines();
         assert_eq!(lines.len(), 3);
-        assert!(lines[0].starts_with("bounded: 3 view shading normals beyond the horizon"), "{}", lines[0]);
-        assert!(lines[1].starts_with("bounded: 2 pixels beyond f32") && lines[2].contains("1.5000e0 W"));
+        assert!(lines[0].starts_with("bounded: view shading normals beyond the horizon"), "{}", lines[0]);
+        assert!(lines[0].ends_with(": 3"));
+        assert!(lines[1].starts_with("bounded: pixels beyond f32") && lines[2].ends_with(": 1.5000e0"));
     }
 
     #[test]

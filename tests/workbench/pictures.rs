@@ -256,6 +256,14 @@ fn plan_pane() {
     pane(Pane::Plan, "pane_plan");
 }
 
+/// Times and memory, and below them what was bounded: paths that the bounce limit ended, and their power.
+#[test]
+fn bounded_in_the_plan() {
+    let mut session = beside(small("cornell", 1), Pane::Plan);
+    session.render.max_depth = Some(3);
+    picture(session, [640.0, 860.0], "plan_bounded");
+}
+
 #[test]
 fn areas_plot() {
     picture(beside(small("glass_sphere", 1), Pane::AreaPlot), PANE, "plot_areas");
