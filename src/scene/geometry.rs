@@ -37,6 +37,8 @@ pub struct Geometry {
     pub spheres: Vec<Sphere>,
     /// Triangles and spheres of the input without area, left out.
     pub zero_area: usize,
+    /// Triangles that were left out because others lie in their place.
+    pub repeated: usize,
 }
 
 /// Memory that a triangle takes while a scene is loaded, and its hierarchy built, bytes: twice its entries in the lists

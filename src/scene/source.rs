@@ -203,6 +203,23 @@ mod tests {
         }
     }
 
+    /// Thousands of copies of a triangle count as one: the first, which rays meet. A pair is left as it is.
+    #[test]
+    fn copies_of_a_triangle_are_left_out() {
+        let open = |copies: usize| {
+            let faces = "f 1 2 3\n".repeat(copies);
+            let text = format!("v -1 0 -1\nv 1 0 -1\nv 0 0 1\nv 5 0 0\n{faces}f 1 2 4\n");
+            let folder = tempfile::tempdir().expect("a folder");
+            let path = folder.path().join("copies.obj");
+            std::fs::write(&path, text).expect("written");
+            super::open(path.to_str().expect("a plain path")).expect("opens")
+        };
+        let (many, pair) = (open(20_000), open(2));
+        assert_eq!((many.geometry.triangles.len(), many.geometry.repeated), (2, 19_999));
+        assert!(many.warnings.iter().any(|w| w == "19999 triangles in the place of others left out"));
+        assert_eq!((pair.geometry.triangles.len(), pair.geometry.repeated), (3, 0));
+    }
+
     /// Moving a light that has no surface keeps the surfaces in memory; moving one that has makes new ones.
     #[test]
     fn edits_keep_what_they_do_not_touch() {

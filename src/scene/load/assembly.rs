@@ -6,7 +6,8 @@ use crate::scene::Camera;
 use crate::scene::Material;
 use crate::scene::geometry::{Geometry, NONE, Sphere};
 use crate::scene::shapes::Mesh;
-use glam::DVec3;
+use glam::{DVec3, Vec3};
+use std::collections::HashSet;
 
 /// The camera before it is moved to the local origin.
 pub(super) struct CameraSource {
@@ -120,7 +121,26 @@ impl Assembly {
 /// Length relative to the scene's radius below which products of edges vanish against the scene in f32.
 const SMALLEST: f64 = 1e-12;
 
-/// Moves the assembly to the local origin, in f32, without its triangles and spheres that have no area.
+/// Triangles that are looked at to see whether many are the same.
+const SAMPLE: usize = 4096;
+
+/// Corners of a triangle as numbers that are equal where it is.
+fn place(triangle: [u32; 3], positions: &[Vec3]) -> [[u32; 3]; 3] {
+    triangle.map(|i| positions[i as usize].to_array().map(f32::to_bits))
+}
+
+/// Whether more than two triangles are the same, judged by a sample.
+///
+/// The hierarchy's builder takes time in the square of boxes that are all the same.
+fn is_crowded(triangles: &[[u32; 3]], positions: &[Vec3]) -> bool {
+    let step = triangles.len().div_ceil(SAMPLE).max(1);
+    let mut sample: Vec<_> = triangles.iter().step_by(step).map(|t| place(*t, positions)).collect();
+    sample.sort_unstable();
+    sample.windows(3).any(|w| w[0] == w[2])
+}
+
+/// Moves the assembly to the local origin, in f32, without its triangles and spheres that have no area. Where many
+/// triangles are the same the first alone is kept, which is the one that rays meet.
 pub(super) fn local_geometry(assembly: &Assembly, origin: DVec3, radius: f64) -> Geometry {
     let mesh = &assembly.mesh;
     let mut g = Geometry {
@@ -137,10 +157,15 @@ pub(super) fn local_geometry(assembly: &Assembly, origin: DVec3, radius: f64) ->
     };
     g.zero_area = assembly.spheres.len() - g.spheres.len();
     let smallest = radius * radius * (SMALLEST * SMALLEST);
+    let mut places = is_crowded(&mesh.triangles, &g.positions).then(HashSet::new);
     for (i, t) in mesh.triangles.iter().enumerate() {
         let [a, b, c] = t.map(|i| mesh.positions[i as usize]);
         if (b - a).cross(c - a).length() <= smallest {
             g.zero_area += 1;
+            continue;
+        }
+        if places.as_mut().is_some_and(|p| !p.insert(place(*t, &g.positions))) {
+            g.repeated += 1;
             continue;
         }
         g.triangles.push(*t);

@@ -322,6 +322,9 @@ impl<'a> Loader<'a> {
         if self.assembly.lights.is_empty() {
             self.warnings.push("the scene has no light".into());
         }
+        if geometry.repeated > 0 {
+            self.warnings.push(format!("{} triangles in the place of others left out", geometry.repeated));
+        }
         if geometry.zero_area > 0 {
             self.warnings.push(format!("{} triangles or spheres without area left out", geometry.zero_area));
         }
