@@ -32,13 +32,11 @@ impl ViewHit {
     /// The hit as that estimator sees it, without a copy unless `own` has to hold one.
     #[inline]
     pub(super) fn seen<'a>(&'a self, estimator: &dyn Estimator, own: &'a mut View) -> &'a View {
-        match self.flat {
-            Some(query) if estimator.is_exact_mean() => {
-                *own = View { query, ..self.view };
-                own
-            }
-            _ => &self.view,
+        if self.flat.is_none() {
+            return &self.view;
         }
+        *own = self.seen_by(estimator);
+        own
     }
 
     /// The hit as that estimator sees it.

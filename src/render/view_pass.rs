@@ -56,7 +56,7 @@ pub struct TileImage {
     /// Pixels with a channel beyond f32, which hold its largest number there.
     pub overflow: u64,
     /// Discs of density estimation that were raised to the resolution of f32.
-    pub floored: u64,
+    pub disc_floor: u64,
 }
 
 /// A finished tile.
@@ -238,7 +238,7 @@ impl ViewPass<'_> {
                     let mut image = self.estimate(&base, n, &slots[i], scratch);
                     image.seconds.view_trace = view_trace;
                     counts.overflow += image.overflow;
-                    counts.disc_floor += image.floored;
+                    counts.disc_floor += image.disc_floor;
                     images[i] = Some(image);
                 }
             }
@@ -317,7 +317,7 @@ impl ViewPass<'_> {
     pub(super) fn estimate(&self, base: &[DVec3], n: u32, slot: &Slot, scratch: &mut Scratch) -> TileImage {
         let mut sums = base.to_vec();
         let mut seconds = PartSeconds::default();
-        let (mut gathered, mut floored) = (0, 0);
+        let (mut gathered, mut disc_floor) = (0, 0);
         let resolution = self.tracer.scene.resolution();
         let mut next = 0;
         while next < scratch.hits.len() {
@@ -329,7 +329,7 @@ impl ViewPass<'_> {
                 for map in self.maps.all() {
                     let from = scratch.indices.len();
                     let radius = self.gather(map, slot, next, scratch);
-                    floored += u64::from(radius > 0.0 && radius <= resolution);
+                    disc_floor += u64::from(radius > 0.0 && radius <= resolution);
                     scratch.spans.push((from, scratch.indices.len(), radius));
                 }
                 next += 1;
@@ -361,7 +361,7 @@ impl ViewPass<'_> {
                 pixel
             })
             .collect();
-        TileImage { pixels, seconds, gathered, overflow, floored }
+        TileImage { pixels, seconds, gathered, overflow, disc_floor }
     }
 
     /// Traces and gathers for a tile as [`ViewPass::run`] does, and keeps what was found: four bytes for each photon of

@@ -27,14 +27,14 @@ impl Differential {
     /// Moves the origin along the unit direction `v` by `s` metres to a surface of unit normal `n`
     /// (Pedersen 2011, eq. 26 corrected). `dv` stays. At grazing incidence as long as it is, never infinite.
     pub fn transfer(&self, v: Vec3, n: Vec3, s: f32) -> Self {
-        let (v, n) = (unit(v), unit(n));
+        let (v, n) = (renormalized(v), renormalized(n));
         let column = |i: usize| stored(transfer(v, n, f64::from(s), self.dp[i].as_dvec3(), self.dv[i].as_dvec3()));
         Self { dp: [column(0), column(1)], dv: self.dv }
     }
 
     /// Reflects at unit normal `n` whose own change over the footprint is `dn` (Pedersen 2011, eq. 28 corrected).
     pub fn reflect(&self, v: Vec3, n: Vec3, dn: [Vec3; 2]) -> Self {
-        let (v, n) = (unit(v), unit(n));
+        let (v, n) = (renormalized(v), renormalized(n));
         let column = |i: usize| stored(reflect(v, n, dn[i].as_dvec3(), self.dv[i].as_dvec3()));
         Self { dp: self.dp, dv: [column(0), column(1)] }
     }
@@ -42,7 +42,7 @@ impl Differential {
     /// Refracts at unit normal `n`, which faces the incident side, with `eta` the ratio of the indices n₁/n₂
     /// (Pedersen 2011, eq. 35 corrected). At the critical angle, where `1/√ε` has its pole, as long as it is, never infinite.
     pub fn refract(&self, v: Vec3, n: Vec3, dn: [Vec3; 2], eta: f32) -> Self {
-        let (v, n) = (unit(v), unit(n));
+        let (v, n) = (renormalized(v), renormalized(n));
         let column = |i: usize| stored(refract(v, n, dn[i].as_dvec3(), self.dv[i].as_dvec3(), f64::from(eta)));
         Self { dp: self.dp, dv: [column(0), column(1)] }
     }
@@ -85,7 +85,7 @@ pub(super) fn stored(c: DVec3) -> Vec3 {
 ///
 /// Two of Newton's steps for `1/√x` from 1, each of which squares the error, leave none: no root and no division.
 #[inline]
-pub(super) fn unit(v: Vec3) -> DVec3 {
+pub(super) fn renormalized(v: Vec3) -> DVec3 {
     let v = v.as_dvec3();
     let x = v.length_squared();
     let y = 1.5 - 0.5 * x;

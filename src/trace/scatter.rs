@@ -2,7 +2,7 @@
 
 use crate::math::rgb::Rgb;
 use crate::scene::{Material, Scene};
-use crate::trace::differential::unit;
+use crate::trace::differential::renormalized;
 use crate::trace::{Differential, Surface};
 use glam::{DVec3, Vec3};
 
@@ -34,7 +34,7 @@ pub struct SpecularRay {
 
 /// Weights of a specular material for light along the unit direction `v`; None for other materials.
 pub fn specular_weights(material: &Material, surface: &Surface, v: Vec3) -> Option<SpecularWeights> {
-    let cos = -unit(v).dot(unit(shading_towards(surface, v)));
+    let cos = -renormalized(v).dot(renormalized(shading_towards(surface, v)));
     match *material {
         Material::Mirror { reflectance } => {
             Some(SpecularWeights { reflected: reflectance, refracted: Rgb::ZERO, eta: 1.0 })
@@ -80,7 +80,7 @@ fn refracted_cosine(cos: f64, eta: f64) -> Option<f64> {
 /// The reflected ray. `d` is the differential transferred to the surface.
 pub fn reflected(scene: &Scene, surface: &Surface, v: Vec3, d: &Differential) -> SpecularRay {
     let mirror = |n: Vec3| {
-        let (v, n) = (unit(v), unit(n));
+        let (v, n) = (renormalized(v), renormalized(n));
         v - n * (2.0 * v.dot(n))
     };
     let bent = shading_towards(surface, v);
@@ -94,7 +94,7 @@ pub fn reflected(scene: &Scene, surface: &Surface, v: Vec3, d: &Differential) ->
 /// The refracted ray for the ratio `eta` of [`SpecularWeights`]; at total internal reflection the grazing direction.
 pub fn refracted(scene: &Scene, surface: &Surface, v: Vec3, d: &Differential, eta: f32) -> SpecularRay {
     let bend = |n: Vec3| {
-        let (v, n, eta) = (unit(v), unit(n), f64::from(eta));
+        let (v, n, eta) = (renormalized(v), renormalized(n), f64::from(eta));
         let vn = v.dot(n);
         let root = refracted_cosine(vn, eta).unwrap_or(0.0);
         v * eta - n * (eta * vn + root)
