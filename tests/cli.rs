@@ -388,13 +388,8 @@ fn without_a_display_the_ring_is_compared() {
 fn an_interrupted_render_writes_what_is_done() {
     let folder = tempfile::tempdir().expect("a folder");
     let exr = folder.path().join("a.exr");
-    let child = Command::new(env!("CARGO_BIN_EXE_cusp"))
-        .args(["render", "ring", "--size", "64x64", "--photons", "2000", "--seconds", "600", "-o", path(&exr)])
-        .stdout(std::process::Stdio::piped())
-        .stderr(std::process::Stdio::piped())
-        .spawn()
-        .expect("the binary runs");
-    let out = interrupt(child);
+    let args = ["render", "ring", "--size", "64x64", "--photons", "2000", "--seconds", "600", "-o", path(&exr)];
+    let out = interrupt(&args);
     assert!(text(&out.stderr).contains("passes were written"), "{}", text(&out.stderr));
     assert!(image::open(&exr).is_ok());
 }
@@ -405,14 +400,9 @@ fn an_interrupted_render_writes_what_is_done() {
 fn an_interrupted_comparison_writes_its_tiles() {
     let folder = tempfile::tempdir().expect("a folder");
     let o = folder.path().join("part");
-    let child = Command::new(env!("CARGO_BIN_EXE_cusp"))
-        .args(["compare", "cornell", "--size", "4096x4096", "--photons", "1000", "--estimators", "regular,integrated"])
-        .args(["--out", path(&o)])
-        .stdout(std::process::Stdio::piped())
-        .stderr(std::process::Stdio::piped())
-        .spawn()
-        .expect("the binary runs");
-    let out = interrupt(child);
+    let mut args = vec!["compare", "cornell", "--size", "4096x4096", "--photons", "1000"];
+    args.extend(["--estimators", "regular,integrated", "--out", path(&o)]);
+    let out = interrupt(&args);
     assert!(text(&out.stderr).contains("of 16384 tiles of each image are in"), "{}", text(&out.stderr));
     for name in ["regular.exr", "integrated.exr"] {
         assert!(image::open(o.join(name)).is_ok(), "{name}");
@@ -420,15 +410,28 @@ fn an_interrupted_comparison_writes_its_tiles() {
     assert!(!o.join("report.json").exists());
 }
 
-/// Sends Ctrl-C after two seconds, which no run of these tests ends within, and waits for exit code 130.
+/// Starts a command that runs for minutes, sends Ctrl-C and waits for exit code 130. A busy machine may not have finished
+/// its first tile by then, and says so: the command is then started again and given four times as long.
 #[cfg(unix)]
-fn interrupt(child: std::process::Child) -> Output {
-    std::thread::sleep(std::time::Duration::from_secs(2));
-    let killed = Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("kill runs");
-    assert!(killed.success());
-    let out = child.wait_with_output().expect("ends");
-    assert_eq!(out.status.code(), Some(130), "{}", text(&out.stderr));
-    out
+fn interrupt(args: &[&str]) -> Output {
+    let mut seconds = 2;
+    loop {
+        let child = Command::new(env!("CARGO_BIN_EXE_cusp"))
+            .args(args)
+            .stdout(std::process::Stdio::piped())
+            .stderr(std::process::Stdio::piped())
+            .spawn()
+            .expect("the binary runs");
+        std::thread::sleep(std::time::Duration::from_secs(seconds));
+        let killed = Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("kill runs");
+        assert!(killed.success());
+        let out = child.wait_with_output().expect("ends");
+        assert_eq!(out.status.code(), Some(130), "{}", text(&out.stderr));
+        if seconds > 60 || !text(&out.stderr).contains("nothing was written") {
+            return out;
+        }
+        seconds *= 4;
+    }
 }
 
 /// The same window gives the same bits; wrong calls are refused.
