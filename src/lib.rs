@@ -6,6 +6,7 @@
 //! A module uses those above it in this list, never those below.
 
 pub mod estimate;
+pub mod final_gather;
 pub mod math;
 pub mod photons;
 pub mod render;

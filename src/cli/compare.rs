@@ -119,6 +119,7 @@ struct Comparison<'a> {
     notes: Vec<String>,
     start: Instant,
     load: f64,
+    has_truth: bool,
 }
 
 impl<'a> Comparison<'a> {
@@ -144,8 +145,11 @@ impl<'a> Comparison<'a> {
         let estimators = match (&args.estimators, &args.flags.estimator) {
             (Some(list), _) | (None, Some(list)) => registry::estimators(list)?,
             (None, None) if of_session => session.estimators(),
+            // Ways of final gathering are compared under one estimator.
+            (None, None) if settings.final_gather != "none" => vec![registry::estimator(&settings.estimator)?],
             (None, None) => ESTIMATORS.iter().filter_map(|e| e.default_estimator()).collect(),
         };
+        let estimators = settings.with_final_gathering(&estimators)?;
         if estimators.is_empty() {
             return Err(Failure::Call(format!("{}: no panel has an estimator; give --estimators", args.scene)));
         }
@@ -188,11 +192,17 @@ impl<'a> Comparison<'a> {
         // The truth is made of the same photons, so the plan has to serve it too.
         let regular = Regular::with_rays(TRUTH_RAYS);
         let truth = [Slot { estimator: &regular, gather: settings.gather }];
-        let also: &[Slot] = if args.truth == Truth::None { &[] } else { &truth };
+        // Nor does it hold where light does not come from the photons around a hit.
+        let gathers = estimators.iter().any(|e| e.final_gathering().is_some());
+        if gathers && args.truth != Truth::None && reference.is_none() {
+            notes.push("no truth of the same photons with final gathering: give --reference for an error".to_owned());
+        }
+        let has_truth = args.truth != Truth::None && !gathers;
+        let also: &[Slot] = if has_truth { &truth } else { &[] };
         check_images(&settings, estimators.len())?;
         let mut renderer = Renderer::planned_for(Arc::new(scene), settings, estimators, also);
         renderer.check_memory()?;
-        Ok(Self { args, crop, enlarge, renderer, reference, notes, start, load })
+        Ok(Self { args, crop, enlarge, renderer, reference, has_truth, notes, start, load })
     }
 
     fn run(mut self) -> Result<(), Failure> {
@@ -273,6 +283,9 @@ impl<'a> Comparison<'a> {
 
     /// `regular` with 16×16 view rays and full overlap on the photons of the pass; None if not asked for or stopped.
     fn truth(&self, crop: Rect, hidden: bool) -> Option<(Rect, Image)> {
+        if !self.has_truth {
+            return None;
+        }
         let region = match self.args.truth {
             Truth::None => return None,
             Truth::Crop => crop,

@@ -30,9 +30,13 @@ pub struct CommonFlags {
     /// Light to show: all, direct, caustic or global
     #[arg(long, value_name = "L")]
     pub light: Option<String>,
-    /// Final gathering: none
+    /// Final gathering: none, classic, precomputed or ray-differentials, with settings as in classic:rays=800; where
+    /// estimators are compared a list, each with each
     #[arg(long, value_name = "M")]
     pub final_gather: Option<String>,
+    /// Rays of final gathering from each view hit; 200 if left out
+    #[arg(long, value_name = "N", value_parser = count, allow_negative_numbers = true)]
+    pub final_gather_rays: Option<i64>,
     /// Where direct light comes from: shadow_rays or photons
     #[arg(long, value_name = "D")]
     pub direct: Option<String>,
@@ -109,6 +113,7 @@ impl CommonFlags {
         over(&mut render.max_depth, &self.max_depth);
         over(&mut render.split_depth, &self.split_depth);
         over(&mut render.final_gather, &self.final_gather);
+        over(&mut render.final_gather_rays, &self.final_gather_rays);
         over(&mut render.light, &self.light);
         over(&mut render.direct, &self.direct);
         over(&mut render.shadow_rays, &self.shadow_rays);

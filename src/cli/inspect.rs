@@ -11,6 +11,7 @@ use crate::estimate::registry::{self, ESTIMATORS};
 use crate::photons::PhotonKind;
 use crate::render::inspect::{InspectError, Inspection, PhotonRow, inspect};
 use crate::render::pass::Pass;
+use crate::render::settings::RenderSettings;
 use crate::scene::open;
 use clap::Args;
 use std::sync::Arc;
@@ -49,7 +50,7 @@ pub fn run(args: &InspectArgs) -> Result<(), Failure> {
         let scene = open(&args.scene)?;
         // Here `--estimator` may be a list, like `--estimators`.
         let settings = CommonFlags { estimator: None, ..args.flags.clone() }.settings(&scene)?;
-        let estimators = chosen(args)?;
+        let estimators = settings.with_final_gathering(&chosen(args, &settings)?)?;
         let sort = sort_by(args.sort.as_deref(), &estimators)?;
         // Before any photon is traced.
         let size = settings.size;
@@ -87,10 +88,11 @@ fn wrong(error: &InspectError) -> Failure {
     Failure::Call(format!("--pixel: {error}"))
 }
 
-fn chosen(args: &InspectArgs) -> Result<Vec<Box<dyn Estimator>>, Failure> {
+fn chosen(args: &InspectArgs, settings: &RenderSettings) -> Result<Vec<Box<dyn Estimator>>, Failure> {
     match (&args.estimators, &args.flags.estimator) {
         (Some(_), Some(_)) => Err(Failure::Call("--estimator: is in --estimators already; give one of them".into())),
         (Some(list), None) | (None, Some(list)) => Ok(registry::estimators(list)?),
+        (None, None) if settings.final_gather != "none" => Ok(vec![registry::estimator(&settings.estimator)?]),
         (None, None) => Ok(ESTIMATORS.iter().filter_map(|e| e.default_estimator()).collect()),
     }
 }

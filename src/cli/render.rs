@@ -4,7 +4,6 @@ use crate::cli::failure::Failure;
 use crate::cli::flags::CommonFlags;
 use crate::cli::progress::{ProgressWatch, bar, interrupted, listen_for_interrupts};
 use crate::cli::{print, to_json};
-use crate::estimate::registry::estimator;
 use crate::export::report::RenderReport;
 use crate::export::tone::{auto_exposure, to_srgb};
 use crate::export::{Provenance, exr_file, png_file, whole_file};
@@ -63,7 +62,7 @@ pub fn run(args: &RenderArgs) -> Result<(), Failure> {
     args.flags.on_threads(|| {
         let scene = open(&args.scene)?;
         let settings = args.flags.settings(&scene)?;
-        let chosen = estimator(&settings.estimator)?;
+        let chosen = settings.chosen().map_err(|e| Failure::Call(format!("--final-gather: {e}")))?;
         let name = chosen.name();
         let stays = !chosen.is_consistent() || settings.gather == Gather::Knn;
         let load = start.elapsed().as_secs_f64();

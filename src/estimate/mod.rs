@@ -4,6 +4,7 @@ pub mod clip;
 pub mod construction;
 pub mod coplanar;
 pub mod density;
+pub mod final_gathering;
 pub mod integrated;
 pub mod kernel;
 pub mod multi_sampled;
@@ -18,6 +19,7 @@ mod energy_tests;
 mod property_tests;
 
 pub use construction::{Construction, SamplingPoint};
+pub use final_gathering::{FinalGatherMethod, FinalGathering};
 
 use crate::photons::MapPhoton;
 use crate::photons::map::Query;
@@ -77,6 +79,11 @@ pub trait Estimator: Send + Sync {
     /// the place of smaller ones that tile it.
     fn is_exact_mean(&self) -> bool {
         false
+    }
+
+    /// How global light is gathered by one more bounce of many rays; None where it comes from the photons around the hit.
+    fn final_gathering(&self) -> Option<&FinalGathering> {
+        None
     }
 
     /// Weight of one photon, 1/m²: its kernel's mean over the view footprint, over its area. Finite, not negative.

@@ -2,6 +2,7 @@
 
 use crate::estimate::coplanar::Coplanar;
 use crate::estimate::density::Density;
+use crate::estimate::final_gathering::{FinalGathering, KEYS, WithFinalGathering};
 use crate::estimate::integrated::Integrated;
 use crate::estimate::multi_sampled::MultiSampled;
 use crate::estimate::regular::Regular;
@@ -74,11 +75,19 @@ impl Entry {
     }
 }
 
-/// The estimator that `text` names, as in `multi_sampled:n=8,grid=cells`.
+/// The estimator that `text` names, as in `multi_sampled:n=8,grid=cells`, or with final gathering as in
+/// `integrated+ray-differentials:rays=800`.
 ///
 /// # Errors
 /// An unknown name or setting, or a value out of range.
 pub fn estimator(text: &str) -> Result<Box<dyn Estimator>, SpecError> {
+    if let Some((own, final_gathering)) = text.split_once('+') {
+        let inner = estimator(own)?;
+        return Ok(match FinalGathering::parse(final_gathering)? {
+            Some(f) => Box::new(WithFinalGathering::new(inner, f)),
+            None => inner,
+        });
+    }
     let spec = Spec::parse(text)?;
     match ESTIMATORS.iter().find(|e| e.id == spec.id) {
         Some(entry) => (entry.parse)(&spec),
@@ -91,14 +100,53 @@ pub fn estimator(text: &str) -> Result<Box<dyn Estimator>, SpecError> {
 /// # Errors
 /// As [`estimator`].
 pub fn with_setting(text: &str, key: &str, value: &str) -> Result<Option<Box<dyn Estimator>>, SpecError> {
+    if let Some((own, gathering)) = text.split_once('+') {
+        if !KEYS.contains(&key) {
+            return Ok(match with_setting(own, key, value)? {
+                Some(inner) => Some(estimator(&format!("{}+{gathering}", inner.name()))?),
+                None => None,
+            });
+        }
+        let spec = Spec::parse(gathering)?;
+        return estimator(&format!("{own}+{}", spec.with(key, value))).map(Some);
+    }
     let spec = Spec::parse(text)?;
     let takes = |e: &Entry| e.settings.split(", ").any(|s| s.split('=').next() == Some(key));
     if !ESTIMATORS.iter().any(|e| e.id == spec.id && takes(e)) {
         return estimator(text).map(|_| None);
     }
-    let others = spec.pairs().filter(|(k, _)| *k != key).map(|(k, v)| format!("{k}={v}"));
-    let settings: Vec<String> = others.chain([format!("{key}={value}")]).collect();
-    estimator(&format!("{}:{}", spec.id, settings.join(","))).map(Some)
+    estimator(&spec.with(key, value)).map(Some)
+}
+
+/// Each estimator that has no final gathering yet, with each of `all` in turn (None for without); the others as they are.
+///
+/// # Errors
+/// None, if the estimators came from here.
+pub fn with_final_gathering(
+    estimators: &[Box<dyn Estimator>],
+    all: &[Option<FinalGathering>],
+) -> Result<Vec<Box<dyn Estimator>>, SpecError> {
+    let each = estimators.iter().flat_map(|e| {
+        let name = e.name();
+        match e.final_gathering() {
+            Some(_) => vec![name],
+            None => all.iter().map(|f| f.map_or(name.clone(), |f| format!("{name}+{f}"))).collect(),
+        }
+    });
+    each.map(|name| estimator(&name)).collect()
+}
+
+/// A list of final gatherings, as in `none,classic,ray-differentials:rays=200,pattern=sobol`; None stands for `none`.
+///
+/// # Errors
+/// As [`FinalGathering::parse`], or an empty list.
+pub fn final_gatherings(text: &str) -> Result<Vec<Option<FinalGathering>>, SpecError> {
+    let specs = split_list(text);
+    if specs.is_empty() {
+        let what = "name at least one of none, classic, precomputed, ray-differentials".to_owned();
+        return Err(SpecError { text: text.to_owned(), what });
+    }
+    specs.iter().map(|s| FinalGathering::parse(s)).collect()
 }
 
 /// A list as in `regular,multi_sampled:n=8,grid=cells,integrated`: a part without a name that is known belongs to the
@@ -107,21 +155,30 @@ pub fn with_setting(text: &str, key: &str, value: &str) -> Result<Option<Box<dyn
 /// # Errors
 /// As [`estimator`], or an empty list.
 pub fn estimators(text: &str) -> Result<Vec<Box<dyn Estimator>>, SpecError> {
+    let specs = split_list(text);
+    if specs.is_empty() {
+        return Err(SpecError { text: text.to_owned(), what: format!("name at least one; there are {}", names()) });
+    }
+    specs.iter().map(|s| estimator(s.trim())).collect()
+}
+
+/// Parts of a list separated by commas; a part that is a setting (`key=value`) belongs to the one before it.
+fn split_list(text: &str) -> Vec<String> {
     let mut specs: Vec<String> = Vec::new();
-    for part in text.split(',').filter(|p| !p.trim().is_empty()) {
-        let is_setting = part.contains('=') && !part.contains(':') || part.trim_start().starts_with("shape=");
+    for part in text.split(',').map(str::trim).filter(|p| !p.is_empty()) {
+        let before = |sign| part.find(sign).unwrap_or(usize::MAX);
+        let is_setting = part.contains('=') && before('=') < before(':') && before('=') < before('+');
         match specs.last_mut() {
             Some(last) if is_setting => {
-                last.push(if last.contains(':') { ',' } else { ':' });
+                // Settings of final gathering come after its own colon.
+                let has_settings = last.rsplit('+').next().is_some_and(|tail| tail.contains(':'));
+                last.push(if has_settings { ',' } else { ':' });
                 last.push_str(part);
             }
             _ => specs.push(part.to_owned()),
         }
     }
-    if specs.is_empty() {
-        return Err(SpecError { text: text.to_owned(), what: format!("name at least one; there are {}", names()) });
-    }
-    specs.iter().map(|s| estimator(s.trim())).collect()
+    specs
 }
 
 /// Names of all estimators, separated by commas.
@@ -152,6 +209,7 @@ mod tests {
             "coplanar:shape=ellipse:20,weight=mean",
             "multi_sampled:n=8,grid=cells",
             "integrated",
+            "multi_sampled:n=8,grid=cells+ray-differentials:rays=200,radius=0.1",
         ] {
             assert_eq!(estimator(text).map(|e| e.name()).expect(text), text);
         }
@@ -164,6 +222,12 @@ mod tests {
         assert_eq!(known.as_deref(), Some("multi_sampled:n=4,grid=cells"));
         assert_eq!(with("regular_3x3", "n", "5").expect("valid").as_deref(), Some("regular_3x3:n=5"));
         assert_eq!(with("integrated", "n", "4"), Ok(None));
+        let gathering = "multi_sampled:n=8,grid=cells+classic:rays=200";
+        let rays = with(gathering, "rays", "50").expect("valid");
+        assert_eq!(rays.as_deref(), Some("multi_sampled:n=8,grid=cells+classic:rays=50"));
+        let n = with(gathering, "n", "4").expect("valid");
+        assert_eq!(n.as_deref(), Some("multi_sampled:n=4,grid=cells+classic:rays=200"));
+        assert_eq!(with("integrated", "rays", "4"), Ok(None));
         assert!(with("multi_sampled", "n", "1").is_err() && with("sharp", "n", "2").is_err());
     }
 
@@ -175,6 +239,22 @@ mod tests {
             names,
             ["regular", "coplanar:shape=ellipse:8,weight=mean", "multi_sampled:n=2,grid=cells", "integrated"]
         );
+    }
+
+    #[test]
+    fn final_gathering_goes_with_each_estimator() {
+        let list = estimators("integrated,multi_sampled:n=2,grid=cells+classic:rays=8,pattern=sobol").expect("parses");
+        let all = final_gatherings("none,ray-differentials:rays=9,blend=on").expect("parses");
+        let names: Vec<_> = with_final_gathering(&list, &all).expect("valid").iter().map(|e| e.name()).collect();
+        assert_eq!(
+            names,
+            [
+                "integrated",
+                "integrated+ray-differentials:rays=9,blend=on",
+                "multi_sampled:n=2,grid=cells+classic:rays=8,pattern=sobol"
+            ]
+        );
+        assert!(final_gatherings("").is_err() && final_gatherings("rays=3").is_err());
     }
 
     #[test]

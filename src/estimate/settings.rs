@@ -14,7 +14,7 @@ pub struct Spec<'a> {
 
 /// What is wrong with an estimator's text; one line.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{}", one_line(&format!("estimator `{text}`: {what}")))]
+#[error("{}", one_line(&format!("`{text}`: {what}")))]
 pub struct SpecError {
     /// The text as given.
     pub text: String,
@@ -46,6 +46,13 @@ impl<'a> Spec<'a> {
     /// All settings as they were given.
     pub fn pairs(&self) -> impl Iterator<Item = (&'a str, &'a str)> {
         self.pairs.iter().copied()
+    }
+
+    /// The text with the setting `key` at `value`, in place of its own.
+    pub fn with(&self, key: &str, value: &str) -> String {
+        let others = self.pairs().filter(|(k, _)| *k != key).map(|(k, v)| format!("{k}={v}"));
+        let settings: Vec<String> = others.chain([format!("{key}={value}")]).collect();
+        format!("{}:{}", self.id, settings.join(","))
     }
 
     /// An error about this text.

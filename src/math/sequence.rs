@@ -36,6 +36,11 @@ impl Sequence {
         Self { sampling, seed }
     }
 
+    /// The seed that it was made with.
+    pub fn seed(&self) -> u64 {
+        self.seed
+    }
+
     /// Four numbers in `[0, 1)` for point `index` in dimension set `set`.
     pub fn four(&self, index: u64, set: u32) -> [f32; 4] {
         match self.sampling {

@@ -5,7 +5,8 @@ use crate::math::rgb::{Rgb, mean};
 use crate::math::sequence::Sequence;
 use crate::scene::{Light, Scene};
 use crate::trace::Differential;
-use crate::trace::surface::{SELF_INTERSECTION, flat_normal};
+use crate::trace::direct::{quad_normal, sample_triangles};
+use crate::trace::surface::SELF_INTERSECTION;
 use glam::Vec3;
 use std::f32::consts::PI;
 
@@ -151,26 +152,6 @@ fn near_axis(axis: Vec3, below: f64, turn: f64) -> Vec3 {
     let sin = (below * (2.0 - below)).max(0.0).sqrt();
     let across = t.as_dvec3() * c + b.as_dvec3() * s;
     (axis.as_dvec3() * (1.0 - below) + across * sin).normalize().as_vec3()
-}
-
-/// Unit normal of a parallelogram with half-edges `u`, `v`, whose product may be too small for f32.
-pub fn quad_normal(u: Vec3, v: Vec3) -> Vec3 {
-    flat_normal([Vec3::ZERO, u, v]).as_vec3()
-}
-
-/// Uniform point on triangles: position and unit normal of the front side.
-pub fn sample_triangles(triangles: &[[Vec3; 3]], cumulative: &[f32], u: f32, v: f32) -> (Vec3, Vec3) {
-    let Some(total) = cumulative.last() else {
-        return (Vec3::ZERO, Vec3::Y);
-    };
-    let target = u * total;
-    let i = cumulative.partition_point(|&a| a <= target).min(cumulative.len() - 1);
-    let before = if i == 0 { 0.0 } else { cumulative[i - 1] };
-    let u = ((target - before) / (cumulative[i] - before)).clamp(0.0, 1.0);
-    let [a, b, c] = triangles[i];
-    let root = u.sqrt();
-    let position = a * (1.0 - root) + b * (root * (1.0 - v)) + c * (root * v);
-    (position, flat_normal([a, b, c]).as_vec3())
 }
 
 #[cfg(test)]

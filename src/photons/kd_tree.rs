@@ -112,28 +112,93 @@ impl KdTree {
         if self.nodes.is_empty() || query.k == 0 {
             return;
         }
-        let center = query.center.to_array();
-        let mut worst = (query.radius * query.radius).min(f32::MAX);
-        // Offsets from the centre to the cell along each axis give the distance to the cell, not only to its plane.
+        self.cells(query.center, (query.radius * query.radius).min(f32::MAX), |node, limit| {
+            let mut worst = limit;
+            self.scan(node, query, &mut worst, found, &accept);
+            worst
+        });
+    }
+
+    /// Indices of the entries in the order in which the tree keeps them: neighbours lie near each other.
+    pub fn order(&self) -> &[u32] {
+        &self.index
+    }
+
+    /// Names each entry by its place in [`KdTree::order`], for whoever has put what they stand for into that order.
+    pub fn renumbered(mut self) -> Self {
+        self.index.iter_mut().zip(0..).for_each(|(index, place)| *index = place);
+        self
+    }
+
+    /// Calls `visit` with every entry within `radius` of `center` (metres) and its squared distance.
+    #[inline]
+    pub fn within(&self, center: Vec3, radius: f32, mut visit: impl FnMut(u32, f32)) {
+        let limit = (radius * radius).min(f32::MAX);
+        self.cells(center, limit, |node, limit| {
+            let range = node.start as usize..(node.start + node.count) as usize;
+            let (xs, ys, zs) = (&self.xs[range.clone()], &self.ys[range.clone()], &self.zs[range.clone()]);
+            let index = &self.index[range];
+            for i in 0..index.len() {
+                let (x, y, z) = (xs[i] - center.x, ys[i] - center.y, zs[i] - center.z);
+                let squared = x * x + y * y + z * z;
+                if squared <= limit {
+                    visit(index[i], squared);
+                }
+            }
+            limit
+        });
+    }
+
+    /// The nearest entry within `radius` of `center` (metres) that `accept` takes, and its squared distance; of those at
+    /// the same distance the one of lower index.
+    #[inline]
+    pub fn nearest_one(&self, center: Vec3, radius: f32, accept: impl Fn(u32) -> bool) -> Option<(u32, f32)> {
+        let mut best: Option<(u32, f32)> = None;
+        self.cells(center, (radius * radius).min(f32::MAX), |node, limit| {
+            let mut limit = limit;
+            for i in node.start as usize..(node.start + node.count) as usize {
+                let (x, y, z) = (self.xs[i] - center.x, self.ys[i] - center.y, self.zs[i] - center.z);
+                let squared = x * x + y * y + z * z;
+                let index = self.index[i];
+                let nearer = squared < limit || squared == limit && best.is_none_or(|(b, _)| index < b);
+                if nearer && accept(index) {
+                    best = Some((index, squared));
+                    limit = squared;
+                }
+            }
+            limit
+        });
+        best
+    }
+
+    /// Calls `leaf` with the leaves whose cells come within a squared distance, the near ones first; it returns how far
+    /// to look from then on.
+    #[inline]
+    fn cells(&self, center: Vec3, limit: f32, mut leaf: impl FnMut(Node, f32) -> f32) {
+        if self.nodes.is_empty() {
+            return;
+        }
+        let center = center.to_array();
+        let mut limit = limit;
         let mut stack = [(0u32, 0.0f32, [0.0f32; 3]); 64];
         let mut top = 1;
         while top > 0 {
             top -= 1;
             let (mut at, distance, offset) = stack[top];
-            if distance > worst {
+            if distance > limit {
                 continue;
             }
             loop {
                 let node = self.nodes[at as usize];
                 if node.axis == IS_LEAF {
-                    self.scan(node, query, &mut worst, found, &accept);
+                    limit = leaf(node, limit);
                     break;
                 }
                 let axis = node.axis as usize;
                 let d = center[axis] - node.split;
                 let (near, far) = if d < 0.0 { (at + 1, node.start) } else { (node.start, at + 1) };
                 let beyond = distance - offset[axis] * offset[axis] + d * d;
-                if beyond <= worst {
+                if beyond <= limit {
                     let mut far_offset = offset;
                     far_offset[axis] = d;
                     stack[top] = (far, beyond.max(0.0), far_offset);
@@ -210,6 +275,32 @@ mod tests {
         all.sort_unstable();
         all.truncate(q.k);
         all
+    }
+
+    #[test]
+    fn balls_and_nearest_ones_are_those_of_brute_force() {
+        let sequence = Sequence::new(Sampling::Random, 4);
+        for n in [0usize, 1, 13, 700] {
+            let place = |i: usize| {
+                let x = sequence.four(i as u64, 0);
+                // On a grid, so that distances are equal now and then.
+                Vec3::new((x[0] * 8.0).floor() / 8.0, 0.25, (x[2] * 8.0).floor() / 8.0)
+            };
+            let points: Vec<Vec3> = (0..n).map(place).collect();
+            let tree = KdTree::new(points.iter().copied());
+            for q in 0..50u64 {
+                let x = sequence.four(q, 1);
+                let (center, radius) = (Vec3::new(x[0], x[1] * 0.5, x[2]), [0.1, 0.4, f32::INFINITY][q as usize % 3]);
+                let accept = |i: u32| !i.is_multiple_of(3);
+                let mut found = Vec::new();
+                tree.within(center, radius, |i, d| found.push((d.to_bits(), i)));
+                found.sort_unstable();
+                let query = NearestQuery { center, radius, k: usize::MAX, normal: Vec3::Y, slice: f32::INFINITY };
+                assert_eq!(found, brute(&points, &query, |_| true), "{n} points, query {q}");
+                let one = tree.nearest_one(center, radius, accept).map(|(i, d)| (d.to_bits(), i));
+                assert_eq!(one, brute(&points, &query, accept).first().copied(), "{n} points, query {q}");
+            }
+        }
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 pub mod emission;
 pub mod footprint;
+pub mod irradiance;
 pub mod kd_tree;
 pub mod map;
 pub mod overlap;

@@ -42,7 +42,7 @@ pub fn photons_are_kept(old: &RenderSettings, new: &RenderSettings) -> bool {
 pub fn film_is_kept(old: (&Scene, &RenderSettings), new: (&Scene, &RenderSettings), estimator: &dyn Estimator) -> bool {
     let is_disc = estimator.lookup() == Lookup::Disc;
     let of = |s: &RenderSettings| {
-        let uses_k = is_disc || s.gather == Gather::Knn;
+        let uses_k = is_disc || s.gather == Gather::Knn || estimator.final_gathering().is_some();
         (
             (s.size, s.light, s.direct, s.shadow_rays, s.split_depth),
             (!is_disc).then_some((s.gather, s.footprint_scale.to_bits())),

@@ -112,16 +112,16 @@ pub fn foreseen(
 
 /// Most photons that a pass can store, whatever the scene: one for each surface that a path may meet.
 fn most_stored(settings: &RenderSettings, plan: &Plan) -> u64 {
-    let each = if plan.global_map { u64::from(settings.max_depth) } else { u64::from(plan.needs_photons()) };
+    let each = if plan.bounces() { u64::from(settings.max_depth) } else { u64::from(plan.needs_photons()) };
     settings.photons.saturating_mul(each)
 }
 
 /// Photons that a pass is expected to store, by what the pilot's did.
 fn likely_stored(settings: &RenderSettings, plan: &Plan, pilot: &Pilot) -> u64 {
     let [caustic, global] = pilot.stored_per_photon();
-    let each = f64::from(u8::from(plan.direct_map))
-        + if plan.caustic_map { caustic } else { 0.0 }
-        + if plan.global_map { global } else { 0.0 };
+    let each = f64::from(u8::from(plan.direct_map || plan.gathers()))
+        + if plan.caustic_map || plan.gathers() { caustic } else { 0.0 }
+        + if plan.bounces() { global } else { 0.0 };
     // Rounded up, and never more than there are numbers for: a cast saturates.
     (settings.photons as f64 * each).ceil() as u64
 }

@@ -1,7 +1,6 @@
 //! Rendering: settings, plan, photon pass, view pass, film, and the progressive renderer that drives them.
 
 pub mod change;
-pub mod direct;
 pub mod error_estimate;
 pub mod film;
 pub mod flat_pixels;

@@ -1,6 +1,7 @@
 //! One pass as a value: the photons, their maps, and everything needed to look at it again.
 
 use crate::estimate::Estimator;
+use crate::final_gather::GatherMaps;
 use crate::render::flat_pixels::FlatPixels;
 use crate::render::memory::foreseen;
 use crate::render::photon_pass::{Emitter, PhotonMaps, PhotonPass};
@@ -32,6 +33,8 @@ pub struct Pass {
     pub photons: Arc<PhotonPass>,
     /// The maps made of them.
     pub maps: PhotonMaps,
+    /// What final gathering looks up.
+    pub gathering: GatherMaps,
     /// Number of the pass, from 0.
     pub number: u32,
     /// Area of the footprints relative to the first pass, in `(0, 1]`.
@@ -72,10 +75,10 @@ impl Pass {
         let plan = Plan::new(&scene, &settings, slots, pilot.as_ref());
         foreseen(&scene, &intersector, &settings, &plan, pilot.as_ref(), 1).check(&settings)?;
         let area_factor = area_factor(number);
-        let (photons, maps) = (Arc::default(), PhotonMaps::default());
+        let (photons, maps, gathering) = (Arc::default(), PhotonMaps::default(), GatherMaps::default());
         let flat = needs_flat_pixels(slots.iter().map(|s| s.estimator), &plan, number)
             .then(|| Arc::new(FlatPixels::new(&scene, &intersector, settings.size)));
-        let mut pass = Self { scene, intersector, settings, plan, photons, maps, number, area_factor, flat };
+        let mut pass = Self { scene, intersector, settings, plan, photons, maps, gathering, number, area_factor, flat };
         if pass.plan.needs_photons() {
             pass.photons = Arc::new(pass.emitter().run(u64::from(number), cancelled));
         }
@@ -83,6 +86,7 @@ impl Pass {
             return Ok(None);
         }
         pass.maps = PhotonMaps::new(&pass.scene, &pass.plan, &pass.photons.stored, pass.scale());
+        pass.gathering = gather_maps(&pass.scene, &pass.plan, &pass.settings, &pass.photons, area_factor);
         Ok(Some(pass))
     }
 
@@ -109,6 +113,7 @@ impl Pass {
                 footprints: self.plan.view_differentials,
             },
             maps: &self.maps,
+            gathering: &self.gathering,
             pass: self.number,
             flat: self.flat.as_deref(),
             area_factor: self.area_factor as f32,
@@ -130,6 +135,17 @@ pub(super) fn needs_flat_pixels<'a>(
     number: u32,
 ) -> bool {
     number > 0 && plan.needs_photons() && plan.view_differentials && estimators.any(|e| e.is_exact_mean())
+}
+
+/// What the final gatherings of a plan look up.
+pub(super) fn gather_maps(
+    scene: &Scene,
+    plan: &Plan,
+    settings: &RenderSettings,
+    photons: &PhotonPass,
+    area_factor: f64,
+) -> GatherMaps {
+    GatherMaps::new(scene, &photons.stored, &plan.final_gatherings, settings.k, area_factor)
 }
 
 /// Factor on the axes of footprints whose area is `area_factor` of the first pass's.

@@ -1,17 +1,19 @@
 //! The photon pass: all photons of one pass, and the maps made of them.
 
+use crate::estimate::Estimator;
 use crate::math::hash::mix;
 use crate::math::rgb::{Rgb, mean};
 use crate::math::sequence::{Sampling, Sequence};
 use crate::photons::emission::{Emission, LightShare, emit, share_photons};
 use crate::photons::map::{FootprintLimits, MapParts};
 use crate::photons::path::{Flight, PathCounts, PathSettings, PhotonRecorder, SpecularBounds, Unrecorded};
-use crate::photons::{Photon, PhotonKind, PhotonMap, StoredPhotons};
+use crate::photons::{PhotonKind, PhotonMap, StoredPhotons};
 use crate::render::plan::Plan;
 use crate::scene::Scene;
 use crate::trace::Intersector;
 use rayon::prelude::*;
 use std::ops::Range;
+use std::time::Instant;
 
 /// Number of the plan's pilot pass, whose photons are not those of any other.
 pub const PILOT_PASS: u64 = u64::MAX;
@@ -227,6 +229,8 @@ pub struct PhotonMaps {
     pub caustic: Option<PhotonMap>,
     /// Global photons.
     pub global: Option<PhotonMap>,
+    /// Seconds to build each, in the order of [`PhotonKind::ALL`].
+    seconds: [f64; 3],
 }
 
 impl PhotonMaps {
@@ -238,12 +242,30 @@ impl PhotonMaps {
     /// The same with other structures than the plan's.
     pub fn with_parts(scene: &Scene, plan: &Plan, stored: &StoredPhotons, scale: f32, parts: MapParts) -> Self {
         let limits = FootprintLimits { scale, floor: scene.resolution(), ceiling: scene.radius };
-        let build = |on: bool, photons: &[Photon]| on.then(|| PhotonMap::new(photons, limits, parts));
-        Self {
-            direct: build(plan.direct_map, &stored.direct),
-            caustic: build(plan.caustic_map, &stored.caustic),
-            global: build(plan.global_map, &stored.global),
-        }
+        let mut seconds = [0.0; 3];
+        let mut build = |on: bool, kind: PhotonKind| {
+            on.then(|| {
+                let start = Instant::now();
+                let map = PhotonMap::new(stored.of(kind), limits, parts);
+                seconds[kind as usize] = start.elapsed().as_secs_f64();
+                map
+            })
+        };
+        let direct = build(plan.direct_map, PhotonKind::Direct);
+        let caustic = build(plan.caustic_map, PhotonKind::Caustic);
+        let global = build(plan.global_map, PhotonKind::Global);
+        Self { direct, caustic, global, seconds }
+    }
+
+    /// Those that an estimator looks photons up in: not the global one if final gathering takes its place.
+    pub fn of_estimator(&self, estimator: &dyn Estimator) -> impl Iterator<Item = (PhotonKind, &PhotonMap)> {
+        let global = estimator.final_gathering().is_none();
+        self.by_kind().filter(move |(kind, _)| global || *kind != PhotonKind::Global)
+    }
+
+    /// Seconds to build those that an estimator looks photons up in.
+    pub fn seconds(&self, estimator: &dyn Estimator) -> f64 {
+        self.of_estimator(estimator).map(|(kind, _)| self.seconds[kind as usize]).sum()
     }
 
     /// Those that are there.

@@ -1,7 +1,7 @@
 //! The plan: what a scene needs, and what is left out and why.
 
 use crate::estimate::registry::{needs_photon_footprint, needs_view_footprint};
-use crate::estimate::{Estimator, Lookup};
+use crate::estimate::{Estimator, FinalGatherMethod, FinalGathering, Lookup};
 use crate::photons::map::MapParts;
 use crate::photons::path::PathSettings;
 use crate::render::photon_pass::{self, Emitter};
@@ -31,8 +31,10 @@ pub struct Plan {
     pub direct_map: bool,
     /// Caustic photons are stored.
     pub caustic_map: bool,
-    /// Paths go on after a diffuse bounce, and global photons are stored.
+    /// Global photons are stored, and estimators look them up.
     pub global_map: bool,
+    /// The final gatherings that run. Where there is one, photons of all kinds are stored.
+    pub final_gatherings: Vec<FinalGathering>,
     /// Direct light comes from shadow rays.
     pub shadow_rays: bool,
     /// Light sources are seen.
@@ -90,30 +92,63 @@ impl Plan {
             };
             item("caustic map", on, why)
         };
-        let global_map = {
-            let (on, why) = match pilot {
-                _ if !shows(LightPart::Global) => (false, "this light is not asked for".into()),
-                _ if full => (true, "forced on".into()),
-                None => (false, "no light has power".into()),
-                Some(p) => p.verdict(p.global, "met a diffuse surface again after a diffuse bounce"),
-            };
-            item("global map", on, why)
+        let (global_light, evidence) = match pilot {
+            _ if !shows(LightPart::Global) => (false, "this light is not asked for".into()),
+            _ if full => (true, "forced on".into()),
+            None => (false, "no light has power".into()),
+            Some(p) => p.verdict(p.global, "met a diffuse surface again after a diffuse bounce"),
         };
+        let asked = gatherings(slots);
+        let by_photons = slots.iter().any(|s| s.estimator.final_gathering().is_none());
+        let global_map = item(
+            "global map",
+            global_light && by_photons,
+            if global_light && !by_photons { "final gathering takes its place".into() } else { evidence.clone() },
+        );
+        let final_gatherings = if global_light { asked.clone() } else { Vec::new() };
+        let gathers = item(
+            "final gathering",
+            !final_gatherings.is_empty(),
+            match (asked.is_empty(), global_light) {
+                (true, _) => "not asked for".into(),
+                (false, false) => format!("there is nothing to gather: {evidence}"),
+                (false, true) => asked.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "),
+            },
+        );
+        let layered = |f: &FinalGathering| f.method != FinalGatherMethod::Classic;
+        item(
+            "irradiance pyramid",
+            final_gatherings.iter().any(layered),
+            match (asked.iter().any(layered), gathers) {
+                (false, _) => "no final gathering asks for one".into(),
+                (true, false) => "there is nothing to gather".into(),
+                (true, true) => "for precomputed irradiance".into(),
+            },
+        );
         item(
             "photon bounces after a diffuse surface",
-            global_map,
-            if global_map { "the global map wants them".into() } else { "there is no global map".into() },
+            global_map || gathers,
+            match (global_map, gathers) {
+                (true, _) => "the global map wants them".into(),
+                (_, true) => "final gathering wants them".into(),
+                _ => "there is no global map".into(),
+            },
         );
-        let only_caustic = caustic_map && !global_map && !direct_by_photons;
+        let only_caustic = caustic_map && !global_map && !direct_by_photons && !gathers;
         item(
             "photons that miss all specular surfaces",
-            !only_caustic && (caustic_map || global_map || direct_by_photons),
+            !only_caustic && (caustic_map || global_map || direct_by_photons || gathers),
             if only_caustic { "they cannot become caustic".into() } else { "followed with the others, if any".into() },
         );
-        let direct_map = item(
+        let direct_map = direct_by_photons;
+        item(
             "direct photons",
-            direct_by_photons,
-            if direct_by_photons { "asked for".into() } else { "shadow rays take their place".into() },
+            direct_map || gathers,
+            match (direct_map, gathers) {
+                (true, _) => "asked for".into(),
+                (_, true) => "gather rays look them up; shadow rays take their place elsewhere".into(),
+                _ => "shadow rays take their place".into(),
+            },
         );
         let shadow_rays = item(
             "shadow rays",
@@ -190,11 +225,11 @@ impl Plan {
             has_specular,
             if has_specular { "surfaces reflect or refract".into() } else { "no surface is specular".into() },
         );
-        item("final gathering", false, "not asked for".into());
         Self {
             direct_map,
             caustic_map,
             global_map,
+            final_gatherings,
             shadow_rays,
             emission,
             photon_differentials,
@@ -207,12 +242,36 @@ impl Plan {
 
     /// Whether photons are needed at all.
     pub fn needs_photons(&self) -> bool {
-        self.direct_map || self.caustic_map || self.global_map
+        self.direct_map || self.caustic_map || self.global_map || self.gathers()
+    }
+
+    /// Whether any final gathering runs.
+    pub fn gathers(&self) -> bool {
+        !self.final_gatherings.is_empty()
+    }
+
+    /// Whether photon paths go on after a diffuse bounce.
+    pub fn bounces(&self) -> bool {
+        self.global_map || self.gathers()
+    }
+
+    /// The final gathering of an estimator, if it runs.
+    pub fn final_gathering<'a>(&self, estimator: &'a dyn Estimator) -> Option<&'a FinalGathering> {
+        estimator.final_gathering().filter(|f| self.final_gatherings.contains(f))
     }
 
     /// The first part that a slot needs and a pass of this plan does not have.
     pub fn lacks(&self, slot: &Slot) -> Option<&'static str> {
         let by_k = slot.gather == Gather::Knn || slot.estimator.lookup() == Lookup::Disc;
+        let wanted = slot.estimator.final_gathering();
+        let gathered = wanted.is_none_or(|f| self.final_gatherings.contains(f));
+        if self.bounces() && !gathered {
+            return Some("its final gathering");
+        }
+        if self.bounces() && wanted.is_none() && !self.global_map {
+            return Some("a global map");
+        }
+        let maps = self.direct_map || self.caustic_map || self.global_map;
         let needs = [
             (needs_photon_footprint(slot.estimator), self.photon_differentials, "photon differentials"),
             (needs_view_footprint(slot.estimator), self.view_differentials, "view differentials"),
@@ -220,16 +279,16 @@ impl Plan {
             (!by_k, self.overlap, "footprint hierarchy"),
         ];
         let missing = needs.into_iter().find(|(needed, there, _)| *needed && !*there);
-        missing.filter(|_| self.needs_photons()).map(|(.., part)| part)
+        missing.filter(|_| maps).map(|(.., part)| part)
     }
 
     /// How photon paths are followed under this plan.
     pub fn path_settings(&self, settings: &RenderSettings) -> PathSettings {
         PathSettings {
             max_depth: settings.max_depth,
-            direct: self.direct_map,
-            caustic: self.caustic_map,
-            global: self.global_map,
+            direct: self.direct_map || self.gathers(),
+            caustic: self.caustic_map || self.gathers(),
+            global: self.bounces(),
             differentials: self.photon_differentials,
             spread: settings.diffuse_spread,
         }
@@ -239,6 +298,17 @@ impl Plan {
     pub fn map_parts(&self) -> MapParts {
         MapParts { kd_tree: self.kd_tree, overlap: self.overlap }
     }
+}
+
+/// The final gatherings that slots ask for, each once.
+fn gatherings(slots: &[Slot]) -> Vec<FinalGathering> {
+    let mut all: Vec<FinalGathering> = Vec::new();
+    for f in slots.iter().filter_map(|s| s.estimator.final_gathering()) {
+        if !all.contains(f) {
+            all.push(*f);
+        }
+    }
+    all
 }
 
 /// Photons sent ahead of a render, to see where light goes.

@@ -1,12 +1,13 @@
 //! The progressive renderer: a value that makes one pass at each step.
 
 use crate::estimate::{Estimator, Lookup};
+use crate::final_gather::GatherCounts;
 use crate::render::change::{PhotonStore, World, film_is_kept, photons_are_kept};
 use crate::render::error_estimate::ErrorEstimate;
 use crate::render::film::{Film, Rect};
 use crate::render::flat_pixels::FlatPixels;
 use crate::render::memory::{MemoryNeed, foreseen};
-use crate::render::pass::{Pass, needs_flat_pixels, scale_of};
+use crate::render::pass::{Pass, gather_maps, needs_flat_pixels, scale_of};
 use crate::render::photon_pass::{Emitter, PhotonMaps, PhotonPass};
 use crate::render::plan::{Pilot, Plan, Slot};
 use crate::render::settings::{Gather, PlanMode, RenderSettings};
@@ -73,6 +74,7 @@ pub struct Renderer {
     stored: StoredCounts,
     bounded: Bounded,
     inside_glass: u64,
+    gather_counts: GatherCounts,
     /// Area of footprints for each pass so far.
     areas: Vec<f64>,
     /// What a pass was expected to need, when it was asked last.
@@ -128,6 +130,7 @@ impl Renderer {
             stored: StoredCounts::default(),
             bounded: Bounded::default(),
             inside_glass: 0,
+            gather_counts: GatherCounts::default(),
             areas: vec![1.0],
             need: None,
         }
@@ -213,6 +216,7 @@ impl Renderer {
         self.stored = StoredCounts::default();
         self.bounded = Bounded::default();
         self.inside_glass = 0;
+        self.gather_counts = GatherCounts::default();
         self.seconds = Seconds { bvh: self.seconds.bvh, plan: self.seconds.plan, ..Default::default() };
     }
 
@@ -270,7 +274,7 @@ impl Renderer {
         let Some(result) = self.view(&pass, &now, false, watch) else {
             return Step::Cancelled;
         };
-        self.record(&pass, &now, &result, photon_trace + map_build);
+        self.record(&pass, &now, &result, photon_trace);
         if pass.number == self.counted {
             self.count(&pass, photon_trace, map_build);
         }
@@ -362,9 +366,10 @@ impl Renderer {
         area_factor: f64,
     ) -> Arc<Pass> {
         let maps = PhotonMaps::new(&self.scene, &plan, &photons.stored, scale_of(&settings, area_factor));
+        let gathering = gather_maps(&self.scene, &plan, &settings, &photons, area_factor);
         let (scene, intersector) = (Arc::clone(&self.scene), Arc::clone(&self.intersector));
         let flat = self.flat.as_ref().map(Arc::clone).filter(|f| number > 0 && f.is_of(&scene.camera, settings.size));
-        Arc::new(Pass { scene, intersector, settings, plan, photons, maps, number, area_factor, flat })
+        Arc::new(Pass { scene, intersector, settings, plan, photons, maps, gathering, number, area_factor, flat })
     }
 
     /// Views of a pass by the estimators `now`; None if cancelled.
@@ -381,21 +386,28 @@ impl Renderer {
     }
 
     /// Adds up what the estimators `now` cost.
-    fn record(&mut self, pass: &Pass, now: &[usize], result: &ViewResult, photon_seconds: f64) {
+    fn record(&mut self, pass: &Pass, now: &[usize], result: &ViewResult, photon_trace: f64) {
         self.bounded.views += result.counts.bounded;
         self.inside_glass += result.counts.camera_inside_glass;
         self.bounded.overflow += result.counts.overflow;
         self.bounded.disc_floor += result.counts.disc_floor;
+        self.gather_counts += result.counts.gather;
         self.seconds.view_trace += result.view_trace;
         for (slot, &i) in now.iter().enumerate() {
             let s = &result.seconds[slot];
             self.estimator_seconds[i].view_trace += s.view_trace;
             self.estimator_seconds[i].gather += s.gather;
             self.estimator_seconds[i].estimate += s.estimate;
-            self.photon_seconds[i] += if pass.plan.needs_photons() { photon_seconds } else { 0.0 };
+            self.estimator_seconds[i].final_gather += s.final_gather;
+            let estimator = self.estimators[i].as_ref();
+            // Each estimator is charged with what it looks up, as if it were alone.
+            let gathering = pass.plan.final_gathering(estimator).map_or(0.0, |f| pass.gathering.seconds(f));
+            let own = photon_trace + pass.maps.seconds(estimator) + gathering;
+            self.photon_seconds[i] += if pass.plan.needs_photons() { own } else { 0.0 };
             self.gathered[i] += result.gathered[slot];
             self.seconds.gather += s.gather;
             self.seconds.estimate += s.estimate;
+            self.seconds.final_gather += s.final_gather;
         }
     }
 
@@ -507,6 +519,11 @@ impl Renderer {
     /// Photons stored in all passes.
     pub fn stored(&self) -> StoredCounts {
         self.stored
+    }
+
+    /// Rays of final gathering in all passes, and how they ended.
+    pub fn gather_counts(&self) -> &GatherCounts {
+        &self.gather_counts
     }
 
     /// What was bounded in all passes.

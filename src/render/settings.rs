@@ -1,6 +1,8 @@
 //! Settings of a render: the scene's `[render]` table with the command line's flags on top, checked.
 
-use crate::estimate::registry;
+use crate::estimate::final_gathering::{DEFAULT_RAYS, FinalGathering, MAX_RAYS};
+use crate::estimate::settings::SpecError;
+use crate::estimate::{Estimator, registry};
 use crate::math::sequence::Sampling;
 use crate::photons::spread::DiffuseSpread;
 use crate::render::memory::check_images;
@@ -81,6 +83,9 @@ pub struct RenderSettings {
     pub max_depth: u32,
     /// Specular view hits at which both branches are followed.
     pub split_depth: u32,
+    /// Final gatherings of estimators that name none themselves, as in `none,classic:rays=800`; most commands take one.
+    #[serde(default = "no_final_gathering")]
+    pub final_gather: String,
     /// Which light is shown.
     pub light: LightPart,
     /// Where direct light comes from.
@@ -97,6 +102,10 @@ pub struct RenderSettings {
     pub seed: u64,
     /// Whether unneeded parts are left out.
     pub plan: PlanMode,
+}
+
+fn no_final_gathering() -> String {
+    "none".into()
 }
 
 /// A setting that can't be; one line.
@@ -136,6 +145,7 @@ impl RenderSettings {
             footprint_scale: pick.positive("footprint_scale", |f| f.footprint_scale, 3.0, 1e6)? as f32,
             max_depth: pick.integer("max_depth", |f| f.max_depth, 20, 1, 1000)? as u32,
             split_depth: pick.integer("split_depth", |f| f.split_depth, 1, 0, 8)? as u32,
+            final_gather: pick.final_gather()?,
             light: pick.choice(
                 "light",
                 |f| f.light.as_deref(),
@@ -170,7 +180,6 @@ impl RenderSettings {
             seed,
             plan: PlanMode::Needed,
         };
-        pick.choice("final_gather", |f| f.final_gather.as_deref(), (), &[("none", ())])?;
         let [w, h] = settings.size;
         if w == 0 || h == 0 || w > MAX_SIZE || h > MAX_SIZE || u64::from(w) * u64::from(h) > MAX_PIXELS {
             return Err(SettingError {
@@ -184,6 +193,38 @@ impl RenderSettings {
         check_images(&settings, 1)
             .map_err(|e| SettingError { place: if size.is_some() { "--size".into() } else { e.place }, ..e })?;
         Ok(settings)
+    }
+
+    /// The final gatherings of [`RenderSettings::final_gather`]; None stands for `none`.
+    pub fn final_gatherings(&self) -> Vec<Option<FinalGathering>> {
+        // Its text was read when the settings were made.
+        registry::final_gatherings(&self.final_gather).unwrap_or_else(|_| vec![None])
+    }
+
+    /// Each estimator that names no final gathering itself with each of these settings' in turn.
+    ///
+    /// # Errors
+    /// None, if the estimators came from the registry.
+    pub fn with_final_gathering(
+        &self,
+        estimators: &[Box<dyn Estimator>],
+    ) -> Result<Vec<Box<dyn Estimator>>, SpecError> {
+        registry::with_final_gathering(estimators, &self.final_gatherings())
+    }
+
+    /// The estimator with its final gathering.
+    ///
+    /// # Errors
+    /// More than one final gathering.
+    pub fn chosen(&self) -> Result<Box<dyn Estimator>, SpecError> {
+        let mut all = self.with_final_gathering(&[registry::estimator(&self.estimator)?])?;
+        match (all.pop(), all.is_empty()) {
+            (Some(one), true) => Ok(one),
+            _ => Err(SpecError {
+                text: self.final_gather.clone(),
+                what: "here one final gathering is meant; `cusp compare` shows several side by side".into(),
+            }),
+        }
     }
 }
 
@@ -256,6 +297,21 @@ impl Picker<'_> {
             let names: Vec<_> = all.iter().map(|(n, _)| *n).collect();
             self.wrong(key, from_flag, format!("must be one of {}, got `{text}`", names.join(", ")))
         })
+    }
+
+    fn final_gather(&self) -> Result<String, SettingError> {
+        let most = i64::from(MAX_RAYS);
+        let rays = self.integer("final_gather_rays", |f| f.final_gather_rays, i64::from(DEFAULT_RAYS), 1, most)?;
+        let (value, from_flag) = self.get(|f| f.final_gather.as_deref());
+        let Some(text) = value else { return Ok(no_final_gathering()) };
+        let all = registry::final_gatherings(text).map_err(|e| self.wrong("final_gather", from_flag, e.to_string()))?;
+        let name = |f: &Option<FinalGathering>| match f {
+            None => no_final_gathering(),
+            // One that names its rays itself keeps them.
+            Some(f) if f.rays != DEFAULT_RAYS => f.to_string(),
+            Some(f) => FinalGathering { rays: rays as u32, ..*f }.to_string(),
+        };
+        Ok(all.iter().map(name).collect::<Vec<_>>().join(","))
     }
 
     fn estimator(&self) -> Result<String, SettingError> {

@@ -22,6 +22,9 @@ pub struct Seconds {
     pub gather: f64,
     /// Evaluating estimators.
     pub estimate: f64,
+    /// Final gathering: its rays and what they look up.
+    #[serde(default)]
+    pub final_gather: f64,
     /// Everything else: films, error estimates, files, passes that were dropped.
     pub other: f64,
     /// From start to end: the sum of the parts.
@@ -41,8 +44,9 @@ impl Seconds {
 
     /// Sum of all parts.
     pub fn sum(&self) -> f64 {
-        let Self { load, bvh, plan, photon_trace, map_build, view_trace, gather, estimate, other, total: _ } = *self;
-        load + bvh + plan + photon_trace + map_build + view_trace + gather + estimate + other
+        let Self { load, bvh, plan, photon_trace, map_build, view_trace, gather, estimate, final_gather, other, total: _ } =
+            *self;
+        load + bvh + plan + photon_trace + map_build + view_trace + gather + estimate + final_gather + other
     }
 }
 

@@ -1,14 +1,16 @@
 //! View paths: from the camera, by specular surfaces, to the diffuse surfaces where radiance is estimated.
 
 use crate::estimate::{Estimator, View};
+use crate::final_gather::{GatherCounts, GatherPoint};
+use crate::math::hash::mix;
 use crate::math::rgb::{Rgb, in_f32, mean};
 use crate::math::sequence::Sequence;
 use crate::photons::map::Query;
 use crate::photons::path::{MAX_ANGLE, PathCounts, attenuation, medium_before, medium_behind};
-use crate::render::direct::{self, Receiver};
 use crate::render::plan::Plan;
 use crate::render::settings::RenderSettings;
 use crate::scene::{Material, Scene};
+use crate::trace::direct::{self, Receiver};
 use crate::trace::scatter::{SpecularRay, reflected, refracted, specular_weights};
 use crate::trace::{Differential, Intersector, Ray, Surface};
 use glam::{DVec3, Vec3};
@@ -26,9 +28,17 @@ pub struct ViewHit {
     pub weight: Rgb,
     /// Index of the pixel in its tile.
     pub pixel: u32,
+    /// Seed of the gather rays from here.
+    pub seed: u64,
 }
 
 impl ViewHit {
+    /// The hit as a point at which light is gathered.
+    pub fn point(&self) -> GatherPoint {
+        let query = &self.view.query;
+        GatherPoint { position: query.center, normal: query.normal, found_along: self.view.direction }
+    }
+
     /// The hit as that estimator sees it, without a copy unless `own` has to hold one.
     #[inline]
     pub(super) fn seen<'a>(&'a self, estimator: &dyn Estimator, own: &'a mut View) -> &'a View {
@@ -66,6 +76,8 @@ pub struct ViewCounts {
     pub overflow: u64,
     /// Discs of density estimation that were raised to the resolution of f32.
     pub disc_floor: u64,
+    /// Rays of final gathering.
+    pub gather: GatherCounts,
 }
 
 /// What view paths need.
@@ -150,6 +162,7 @@ impl ViewTracer<'_> {
         recorder: &mut impl ViewRecorder,
     ) -> DVec3 {
         let mut radiance = DVec3::ZERO;
+        let before = hits.len();
         stack.clear();
         let differential = if self.footprints { differential } else { Differential::default() };
         stack.push(Branch { ray, differential, throughput: Rgb::ONE, medium: None, depth: 0, specular: 0 });
@@ -205,6 +218,7 @@ impl ViewTracer<'_> {
                             flat: None,
                             weight,
                             pixel,
+                            seed: mix(mix(sequence.seed(), index), (hits.len() - before) as u64),
                         });
                         made_hit = true;
                     }

@@ -2,6 +2,8 @@
 
 use crate::estimate::registry::needs_view_footprint;
 use crate::estimate::{Gathered, Lookup};
+use crate::final_gather::gather_ray::GatherTracer;
+use crate::final_gather::{FinalGatherer, GatherCounts, GatherMaps, GatherScratch, Unrecorded as Unheard};
 use crate::math::hash::mix;
 use crate::math::rgb::{Rgb, in_f32};
 use crate::math::sequence::{Sampling, Sequence};
@@ -30,18 +32,21 @@ pub struct PartSeconds {
     pub gather: f64,
     /// Evaluating the estimator.
     pub estimate: f64,
+    /// Final gathering: its rays and what they look up.
+    pub final_gather: f64,
 }
 
 impl PartSeconds {
-    /// All three.
+    /// All of it.
     pub fn total(&self) -> f64 {
-        self.view_trace + self.gather + self.estimate
+        self.view_trace + self.gather + self.estimate + self.final_gather
     }
 
     fn add(&mut self, o: &Self, factor: f64) {
         self.view_trace += o.view_trace * factor;
         self.gather += o.gather * factor;
         self.estimate += o.estimate * factor;
+        self.final_gather += o.final_gather * factor;
     }
 }
 
@@ -57,6 +62,8 @@ pub struct TileImage {
     pub overflow: u64,
     /// Discs of density estimation that were raised to the resolution of f32.
     pub disc_floor: u64,
+    /// Rays of final gathering.
+    pub gather_counts: GatherCounts,
 }
 
 /// A finished tile.
@@ -77,6 +84,8 @@ pub struct ViewPass<'a> {
     pub tracer: ViewTracer<'a>,
     /// The photons.
     pub maps: &'a PhotonMaps,
+    /// What final gathering looks up.
+    pub gathering: &'a GatherMaps,
     /// Number of the pass, from 0; from 1 on rays are jittered.
     pub pass: u32,
     /// Where an exact mean may take more of the pixel than the ray's cell.
@@ -123,6 +132,8 @@ pub struct GatheredTile {
     indices: Vec<u32>,
     /// As in [`Scratch`].
     spans: Vec<(usize, usize, f32)>,
+    /// Whether it looked into the global map.
+    global: bool,
     /// Thread seconds of its view rays and of the gather.
     pub seconds: PartSeconds,
 }
@@ -130,7 +141,9 @@ pub struct GatheredTile {
 impl GatheredTile {
     /// Each hit with its photons in each map. `maps` are those that they were gathered from.
     pub fn each<'a>(&'a self, maps: &'a PhotonMaps) -> impl Iterator<Item = (&'a ViewHit, Gathered<'a>)> {
-        let of_hit = self.hits.iter().flat_map(move |hit| maps.all().map(move |map| (hit, map)));
+        let seen = move |kind: PhotonKind| self.global || kind != PhotonKind::Global;
+        let own = move || maps.by_kind().filter(move |(kind, _)| seen(*kind));
+        let of_hit = self.hits.iter().flat_map(move |hit| own().map(move |(_, map)| (hit, map)));
         of_hit.zip(&self.spans).map(|((hit, map), &(from, to, radius))| {
             (hit, Gathered { photons: map.photons(), indices: &self.indices[from..to], radius })
         })
@@ -164,6 +177,7 @@ pub(super) struct Scratch {
     /// For each hit and map: where its indices start and end, and the radius of its disc.
     spans: Vec<(usize, usize, f32)>,
     heap: Nearest,
+    gather: GatherScratch,
 }
 
 impl ViewPass<'_> {
@@ -187,7 +201,7 @@ impl ViewPass<'_> {
         let tiles: Vec<TileResult> = results.into_iter().flatten().collect();
         let complete = tiles.len() == all.len();
         let view_trace: f64 = tiles.iter().map(|t| t.view_trace).sum();
-        let others = tiles.iter().flat_map(|t| t.images.iter().map(|i| i.seconds.gather + i.seconds.estimate));
+        let others = tiles.iter().flat_map(|t| t.images.iter().map(|i| i.seconds.total() - i.seconds.view_trace));
         let spent = view_trace + others.sum::<f64>();
         let scale = if spent > 0.0 { wall / spent } else { 0.0 };
         let mut seconds = vec![PartSeconds::default(); slots.len()];
@@ -198,6 +212,7 @@ impl ViewPass<'_> {
             counts.camera_inside_glass += tile.counts.camera_inside_glass;
             counts.overflow += tile.counts.overflow;
             counts.disc_floor += tile.counts.disc_floor;
+            counts.gather += tile.counts.gather;
             for (i, image) in tile.images.iter().enumerate() {
                 seconds[i].add(&image.seconds, scale);
                 gathered[i] += image.gathered;
@@ -239,6 +254,7 @@ impl ViewPass<'_> {
                     image.seconds.view_trace = view_trace;
                     counts.overflow += image.overflow;
                     counts.disc_floor += image.disc_floor;
+                    counts.gather += image.gather_counts;
                     images[i] = Some(image);
                 }
             }
@@ -326,7 +342,7 @@ impl ViewPass<'_> {
             scratch.indices.clear();
             scratch.spans.clear();
             while next < scratch.hits.len() && scratch.indices.len() < BATCH {
-                for map in self.maps.all() {
+                for (_, map) in self.maps.of_estimator(slot.estimator) {
                     let from = scratch.indices.len();
                     let radius = self.gather(map, slot, next, scratch);
                     disc_floor += u64::from(radius > 0.0 && radius <= resolution);
@@ -343,13 +359,23 @@ impl ViewPass<'_> {
                 let mut irradiance = DVec3::ZERO;
                 let mut own = hit.view;
                 let seen = hit.seen(slot.estimator, &mut own);
-                for (map, &(from, to, radius)) in self.maps.all().zip(spans.by_ref()) {
+                let maps = self.maps.of_estimator(slot.estimator);
+                for ((_, map), &(from, to, radius)) in maps.zip(spans.by_ref()) {
                     let found = Gathered { photons: map.photons(), indices: &scratch.indices[from..to], radius };
                     irradiance += slot.estimator.irradiance(&found, seen);
                 }
                 sums[hit.pixel as usize] += irradiance * hit.weight.as_dvec3();
             }
             seconds.estimate += start.elapsed().as_secs_f64();
+        }
+        let start = Instant::now();
+        scratch.gather.counts = GatherCounts::default();
+        if let Some(gatherer) = self.gatherer(slot) {
+            for hit in &scratch.hits {
+                let irradiance = gatherer.irradiance(&hit.point(), hit.seed, &mut scratch.gather, &mut Unheard);
+                sums[hit.pixel as usize] += irradiance * hit.weight.as_dvec3();
+            }
+            seconds.final_gather = start.elapsed().as_secs_f64();
         }
         let scale = 1.0 / f64::from(n * n);
         let mut overflow = 0;
@@ -361,7 +387,16 @@ impl ViewPass<'_> {
                 pixel
             })
             .collect();
-        TileImage { pixels, seconds, gathered, overflow, disc_floor }
+        TileImage { pixels, seconds, gathered, overflow, disc_floor, gather_counts: scratch.gather.counts }
+    }
+
+    /// What gathers global light for a slot, if final gathering does.
+    pub fn gatherer(&self, slot: &Slot) -> Option<FinalGatherer<'_>> {
+        let t = &self.tracer;
+        let settings = t.plan.final_gathering(slot.estimator)?;
+        let tracer =
+            GatherTracer { scene: t.scene, intersector: t.intersector, max_depth: t.settings.max_depth };
+        Some(FinalGatherer::new(tracer, settings, self.gathering))
     }
 
     /// Traces and gathers for a tile as [`ViewPass::run`] does, and keeps what was found: four bytes for each photon of
@@ -374,14 +409,15 @@ impl ViewPass<'_> {
         let view_trace = start.elapsed().as_secs_f64();
         let start = Instant::now();
         for hit in 0..scratch.hits.len() {
-            for map in self.maps.all() {
+            for (_, map) in self.maps.of_estimator(slot.estimator) {
                 let from = scratch.indices.len();
                 let radius = self.gather(map, slot, hit, &mut scratch);
                 scratch.spans.push((from, scratch.indices.len(), radius));
             }
         }
-        let seconds = PartSeconds { view_trace, gather: start.elapsed().as_secs_f64(), estimate: 0.0 };
-        GatheredTile { hits: scratch.hits, indices: scratch.indices, spans: scratch.spans, seconds }
+        let seconds = PartSeconds { view_trace, gather: start.elapsed().as_secs_f64(), ..Default::default() };
+        let global = slot.estimator.final_gathering().is_none();
+        GatheredTile { hits: scratch.hits, indices: scratch.indices, spans: scratch.spans, global, seconds }
     }
 
     /// Calls `visit` with the photons of each of the scratch's hits (its index) in each map, as `estimate` sees them.
@@ -392,7 +428,7 @@ impl ViewPass<'_> {
         mut visit: impl FnMut(usize, &ViewHit, PhotonKind, &Gathered),
     ) {
         for hit in 0..scratch.hits.len() {
-            for (kind, map) in self.maps.by_kind() {
+            for (kind, map) in self.maps.of_estimator(slot.estimator) {
                 scratch.indices.clear();
                 let radius = self.gather(map, slot, hit, scratch);
                 let gathered = Gathered { photons: map.photons(), indices: &scratch.indices, radius };

@@ -210,9 +210,12 @@ pub struct RenderFile {
     /// Specular view hits at which both branches are followed.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub split_depth: Option<i64>,
-    /// none.
+    /// none, classic, precomputed or ray-differentials, with settings; a list where estimators are compared.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub final_gather: Option<String>,
+    /// Rays of final gathering from each view hit.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub final_gather_rays: Option<i64>,
     /// all, direct, caustic or global.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub light: Option<String>,

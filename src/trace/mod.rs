@@ -1,6 +1,7 @@
-//! Rays, ray differentials, and the intersector.
+//! Rays, ray differentials, the intersector, and direct light by shadow rays.
 
 pub mod differential;
+pub mod direct;
 pub mod intersector;
 pub mod scatter;
 pub mod surface;

@@ -139,6 +139,7 @@ fn prepare(args: &StudyArgs) -> Result<Prepared, Failure> {
     let seed = args.flags.seed.unwrap_or(1);
     let mut base = RenderSettings::new(&scene, &flags, args.flags.size, seed)?;
     base.plan = args.flags.plan.into();
+    let estimators = base.with_final_gathering(&estimators)?;
     let reference = given_reference(&args.judge, &args.scene, base.light)?;
     if args.flags.size.is_none()
         && let Given::Reference(r) = &reference

@@ -1,7 +1,8 @@
 //! What is swept: values for photons, k, n, footprint scale and gather, and all their combinations.
 
 use crate::estimate::Estimator;
-use crate::estimate::registry::with_setting;
+use crate::estimate::final_gathering::KEYS;
+use crate::estimate::registry::{estimator, with_setting};
 use crate::measure::study::Setting;
 use crate::render::settings::RenderSettings;
 use crate::scene::Scene;
@@ -18,7 +19,8 @@ const MAX_COMBINATIONS: usize = 1_000_000;
 pub struct Sweep {
     photons: Vec<i64>,
     k: Vec<i64>,
-    n: Vec<i64>,
+    /// Settings of estimators and of their final gathering.
+    own: Vec<(String, Vec<String>)>,
     footprint_scale: Vec<f64>,
     gather: Vec<String>,
 }
@@ -47,10 +49,14 @@ impl Sweep {
             match key.trim().replace('-', "_").as_str() {
                 "photons" => whole(&mut sweep.photons),
                 "k" => whole(&mut sweep.k),
-                "n" => whole(&mut sweep.n),
+                "n" => sweep.fill_own(text, "n", &values),
+                own if KEYS.contains(&own) => sweep.fill_own(text, own, &values),
                 "footprint_scale" => fill(&mut sweep.footprint_scale, text, &values, |v| v.parse().ok()),
                 "gather" => fill(&mut sweep.gather, text, &values, |v| Some(v.to_owned())),
-                other => Err(format!("--sweep {other}: sweep photons, k, n, footprint_scale or gather")),
+                other => Err(format!(
+                    "--sweep {other}: sweep photons, k, n, footprint_scale, gather, or of final gathering {}",
+                    KEYS.join(", ")
+                )),
             }?;
         }
         Ok(sweep)
@@ -67,20 +73,17 @@ impl Sweep {
         flags: &RenderFile,
         estimators: &[Box<dyn Estimator>],
     ) -> Result<Vec<Setting>, String> {
-        let lists = [self.photons.len(), self.k.len(), self.n.len(), self.footprint_scale.len(), self.gather.len()];
-        let combinations = lists.iter().fold(estimators.len(), |all, n| all.saturating_mul((*n).max(1)));
+        let lists = [self.photons.len(), self.k.len(), self.footprint_scale.len(), self.gather.len()];
+        let own = self.own.iter().map(|(_, values)| values.len());
+        let combinations = lists.into_iter().chain(own).fold(estimators.len(), |all, n| all.saturating_mul(n.max(1)));
         if combinations > MAX_COMBINATIONS {
             return Err(format!("--sweep: {combinations} combinations, {MAX_COMBINATIONS} at most; sweep less"));
         }
         let mut all: Vec<Setting> = Vec::new();
         let mut seen = HashSet::new();
         for e in estimators {
-            for n in each(&self.n) {
-                let varied = match n {
-                    None => None,
-                    Some(n) => with_setting(&e.name(), "n", &n.to_string()).map_err(|e| format!("--sweep n: {e}"))?,
-                };
-                let e = varied.as_deref().unwrap_or(e.as_ref());
+            for name in self.varied(&e.name())? {
+                let e = &*estimator(&name).map_err(|e| format!("--sweep: {e}"))?;
                 for gather in each(&self.gather) {
                     for k in each(&self.k) {
                         for footprint_scale in each(&self.footprint_scale) {
@@ -103,6 +106,32 @@ impl Sweep {
                     }
                 }
             }
+        }
+        Ok(all)
+    }
+}
+
+impl Sweep {
+    fn fill_own(&mut self, text: &str, key: &str, values: &[&str]) -> Result<(), String> {
+        let mut into = self.own.iter().find(|(k, _)| k == key).map(|(_, v)| v.clone()).unwrap_or_default();
+        fill(&mut into, text, values, |v| Some(v.to_owned()))?;
+        self.own.push((key.to_owned(), into));
+        Ok(())
+    }
+
+    /// An estimator's name with each combination of its own swept settings; alone if it takes none of them.
+    fn varied(&self, name: &str) -> Result<Vec<String>, String> {
+        let mut all = vec![name.to_owned()];
+        for (key, values) in &self.own {
+            let mut next = Vec::new();
+            for name in &all {
+                for value in values {
+                    let varied = with_setting(name, key, value).map_err(|e| format!("--sweep {key}: {e}"))?;
+                    next.push(varied.map_or_else(|| name.clone(), |e| e.name()));
+                }
+            }
+            next.dedup();
+            all = next;
         }
         Ok(all)
     }

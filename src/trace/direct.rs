@@ -3,9 +3,8 @@
 use crate::math::frame::tangents;
 use crate::math::rgb::Rgb;
 use crate::math::sequence::Sequence;
-use crate::photons::emission::{quad_normal, sample_triangles};
 use crate::scene::{Light, Scene};
-use crate::trace::surface::SELF_INTERSECTION;
+use crate::trace::surface::{SELF_INTERSECTION, flat_normal};
 use crate::trace::{Intersector, Ray};
 use glam::{DVec3, Vec3};
 use std::f32::consts::PI;
@@ -172,6 +171,26 @@ fn sphere(r: &Receiver, center: Vec3, radius: f32, power: Rgb, u: f32, v: f32) -
     // L Ω cos θ = Φ/(4π² r²) · 2π (1 - cos θ_max) cos θ.
     let scale = lit / (2.0 * std::f64::consts::PI * d2 * (1.0 + (1.0 - sin2).sqrt()));
     Some(LightSample { offset: (w * distance).as_vec3(), irradiance: power.as_dvec3() * scale })
+}
+
+/// Unit normal of a parallelogram with half-edges `u`, `v`, whose product may be too small for f32.
+pub fn quad_normal(u: Vec3, v: Vec3) -> Vec3 {
+    flat_normal([Vec3::ZERO, u, v]).as_vec3()
+}
+
+/// Uniform point on triangles: position and unit normal of the front side.
+pub fn sample_triangles(triangles: &[[Vec3; 3]], cumulative: &[f32], u: f32, v: f32) -> (Vec3, Vec3) {
+    let Some(total) = cumulative.last() else {
+        return (Vec3::ZERO, Vec3::Y);
+    };
+    let target = u * total;
+    let i = cumulative.partition_point(|&a| a <= target).min(cumulative.len() - 1);
+    let before = if i == 0 { 0.0 } else { cumulative[i - 1] };
+    let u = ((target - before) / (cumulative[i] - before)).clamp(0.0, 1.0);
+    let [a, b, c] = triangles[i];
+    let root = u.sqrt();
+    let position = a * (1.0 - root) + b * (root * (1.0 - v)) + c * (root * v);
+    (position, flat_normal([a, b, c]).as_vec3())
 }
 
 #[cfg(test)]

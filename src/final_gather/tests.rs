@@ -1,0 +1,1 @@
+//! Final gathering against closed forms and brute force.

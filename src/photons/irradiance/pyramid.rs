@@ -1,0 +1,127 @@
+//! The irradiance pyramid: layers of growing radius, each made of the one before.
+
+use crate::photons::irradiance::layer::{Estimates, Layer};
+use crate::photons::irradiance::surface_area::SurfaceAreas;
+use crate::photons::irradiance::GlobalPhotons;
+use crate::scene::Scene;
+use serde::Serialize;
+use std::time::Instant;
+
+/// How a pyramid is made.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PyramidSettings {
+    /// Radius of the first layer, metres; raised to the scene's resolution.
+    pub radius: f32,
+    /// Ratio of a layer's radius to that of the one before, above 1.
+    pub growth: f32,
+    /// Estimates over whole discs and plain means, as published.
+    pub as_published: bool,
+    /// Layers at most, at least 1.
+    pub layers: usize,
+}
+
+/// Photons nearer to one with an estimate than this part of the first radius get none (Gjøl et al., section 3.1).
+pub const PHOTON_SPACING: f32 = 0.25;
+/// Estimates nearer to one of the next layer than this part of their own radius get none there.
+pub const ESTIMATE_SPACING: f32 = 0.75;
+
+/// Memory while a pyramid was made, bytes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct PyramidMemory {
+    /// The photon map, before.
+    pub photons: u64,
+    /// The most at one time: the photon map and the first layer.
+    pub peak: u64,
+    /// All layers, after the photon map is dropped.
+    pub layers: u64,
+}
+
+/// Seconds that a pyramid took.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct PyramidSeconds {
+    /// The first layer.
+    pub first: f64,
+    /// All others.
+    pub others: f64,
+}
+
+/// Layers of irradiance estimates, the most detailed first.
+#[derive(Clone, Debug, Default)]
+pub struct IrradiancePyramid {
+    layers: Vec<Layer>,
+    memory: PyramidMemory,
+    seconds: PyramidSeconds,
+}
+
+impl IrradiancePyramid {
+    /// Makes the first layer of `photons`, and what comes above it when [`IrradiancePyramid::grow`] is called.
+    pub fn new(scene: &Scene, photons: &GlobalPhotons, settings: &PyramidSettings) -> Self {
+        let start = Instant::now();
+        let radius = settings.radius.max(scene.resolution());
+        let areas = (!settings.as_published).then(|| SurfaceAreas::new(scene));
+        let first = Layer::of_photons(photons, radius, radius * PHOTON_SPACING, estimates(areas.as_ref()));
+        let bytes = first.bytes() as u64;
+        let memory =
+            PyramidMemory { photons: photons.bytes() as u64, peak: photons.bytes() as u64 + bytes, layers: bytes };
+        let seconds = PyramidSeconds { first: start.elapsed().as_secs_f64(), others: 0.0 };
+        Self { layers: vec![first], memory, seconds }
+    }
+
+    /// Makes the other layers, until one disc would hold half the scene, a layer is a single estimate, or there are as many
+    /// as the settings allow. The photons are not needed any more.
+    pub fn grow(&mut self, scene: &Scene, settings: &PyramidSettings) {
+        let start = Instant::now();
+        let areas = (!settings.as_published && settings.layers > 1).then(|| SurfaceAreas::new(scene));
+        while let Some(last) = self.layers.last() {
+            let radius = last.radius() * settings.growth;
+            let ends = last.estimates().len() <= 1 || radius <= last.radius() || radius > scene.radius / 2.0;
+            if ends || self.layers.len() >= settings.layers {
+                break;
+            }
+            let next = Layer::of_layer(last, radius, last.radius() * ESTIMATE_SPACING, estimates(areas.as_ref()));
+            self.memory.layers += next.bytes() as u64;
+            self.layers.push(next);
+        }
+        self.memory.peak = self.memory.peak.max(self.memory.layers);
+        self.seconds.others = start.elapsed().as_secs_f64();
+    }
+
+    /// The layers, the most detailed first; at least one.
+    pub fn layers(&self) -> &[Layer] {
+        &self.layers
+    }
+
+    /// Memory while it was made.
+    pub fn memory(&self) -> &PyramidMemory {
+        &self.memory
+    }
+
+    /// Seconds that it took.
+    pub fn seconds(&self) -> &PyramidSeconds {
+        &self.seconds
+    }
+
+    /// Index of the layer whose radius is nearest in ratio to half of a footprint's longest semi-axis (metres); None if
+    /// that semi-axis is shorter than the first layer's radius, so that the nearest estimate takes its place.
+    pub fn layer_for(&self, longest: f32) -> Option<usize> {
+        let position = self.position_for(longest)?;
+        Some((position.round() as usize).min(self.layers.len().saturating_sub(1)))
+    }
+
+    /// The same as a place between layers: 1.25 is a quarter of the way from the second to the third, in the logarithm of
+    /// the radius.
+    pub fn position_for(&self, longest: f32) -> Option<f32> {
+        let first = self.layers.first()?.radius();
+        if !(longest >= first) {
+            return None;
+        }
+        let Some(second) = self.layers.get(1) else { return Some(0.0) };
+        let growth = libm::log2f(second.radius() / first);
+        let last = (self.layers.len() - 1) as f32;
+        Some((libm::log2f(longest / 2.0 / first) / growth).clamp(0.0, last))
+    }
+}
+
+fn estimates<'a>(areas: Option<&'a SurfaceAreas<'a>>) -> Estimates<'a> {
+    areas.map_or(Estimates::AsPublished, Estimates::Corrected)
+}

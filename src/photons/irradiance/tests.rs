@@ -1,0 +1,1 @@
+//! The pyramid against brute force.
