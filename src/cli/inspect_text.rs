@@ -1,6 +1,7 @@
 //! What `inspect` prints for people.
 
 use crate::cli::table::Table;
+use crate::estimate::registry::short_name;
 use crate::math::rgb::Rgb;
 use crate::render::inspect::{Inspection, PathVertex, PhotonRow, Situation};
 use crate::render::pass::Pass;
@@ -111,7 +112,7 @@ fn photons(pass: &Pass, found: &Inspection, sort: usize, limit: usize) -> String
         ["  photon", "hit", "position m", "power W", "half-axes m", "condition", "distance", "fig. 10"]
             .map(Into::into)
             .into();
-    heading.extend(found.estimators.iter().map(|e| e.name.split(':').next().unwrap_or_default().to_owned()));
+    heading.extend(found.estimators.iter().map(|e| short_name(&e.name)));
     let mut table = Table::new(heading);
     for r in &found.rows[..shown] {
         table.row(row(pass, r));

@@ -36,6 +36,16 @@ pub struct GatherCounts {
     pub unknown: u64,
 }
 
+impl GatherCounts {
+    /// One line for people.
+    pub fn line(&self) -> String {
+        let Self { rays, open, second, empty_footprints, unknown } = self;
+        format!(
+            "{rays} rays, {open} met nothing, {second} gathered a second time, {empty_footprints} footprints held no estimate, {unknown} ended where no light is known"
+        )
+    }
+}
+
 impl AddAssign for GatherCounts {
     fn add_assign(&mut self, o: Self) {
         self.rays += o.rays;

@@ -7,6 +7,7 @@ use super::inspector::{Inspected, summary};
 use super::theme::panel_color;
 use super::views::{self, shows_difference};
 use super::worker::messages::{Job, Progress};
+use crate::estimate::registry::short_name;
 use crate::export::false_color::ValueRange;
 use crate::export::panel_files::{Cut, Picture};
 use crate::export::session::{Mode, Panel, Session};
@@ -290,7 +291,7 @@ fn file_names(panel: &Panel) -> (String, String) {
         let name = format!("image-{stem}");
         return (name.clone(), name);
     }
-    let id = panel.estimator.split(':').next().unwrap_or("").to_owned();
+    let id = short_name(&panel.estimator);
     let long = match &panel.heatmap {
         Some(heatmap) => format!("{}-{heatmap}", panel.estimator),
         None => panel.estimator.clone(),

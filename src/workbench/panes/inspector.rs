@@ -2,6 +2,7 @@
 
 use super::Panes;
 use super::widgets::choice;
+use crate::estimate::registry::short_name;
 use crate::math::rgb::mean;
 use crate::workbench::inspector::{plane, summary, table};
 use crate::workbench::theme::{self, mono, number};
@@ -81,7 +82,7 @@ fn sums(ui: &mut Ui, found: &crate::workbench::inspector::Inspected, colors: &[C
         }
         ui.end_row();
         for (e, estimator) in found.inspection.estimators.iter().enumerate() {
-            ui.colored_label(colors[e], mono(estimator.name.split(':').next().unwrap_or("")).color(colors[e]));
+            ui.colored_label(colors[e], mono(short_name(&estimator.name)).color(colors[e]));
             let base = f64::from(mean(estimator.base));
             let rows = f64::from(mean(found.inspection.sum(e))) - base;
             ui.label(mono(number(base)));
