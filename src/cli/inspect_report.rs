@@ -6,7 +6,7 @@ use crate::math::rgb::Rgb;
 use crate::photons::PhotonKind;
 use crate::photons::irradiance::PyramidMemory;
 use crate::render::inspect::gathering::layer_of;
-use crate::render::inspect::{Gathering, RayEnd, Inspection, PathVertex, PhotonRow, Situation, SurfaceKind};
+use crate::render::inspect::{Gathering, Inspection, PathVertex, PhotonRow, RayEnd, Situation, SurfaceKind};
 use crate::render::pass::Pass;
 use crate::render::settings::RenderSettings;
 use crate::render::stats::StoredCounts;

@@ -107,7 +107,10 @@ fn values(found: &Inspection) -> String {
             color(of.value),
         ]);
     }
-    format!("\nvalues: the pixel is that of `cusp render`; the sum is that of the rows and rays below\n{}", table.text())
+    format!(
+        "\nvalues: the pixel is that of `cusp render`; the sum is that of the rows and rays below\n{}",
+        table.text()
+    )
 }
 
 fn photons(pass: &Pass, found: &Inspection, sort: usize, limit: usize) -> String {

@@ -52,11 +52,14 @@ impl Layer {
             .par_iter()
             .map(|&i| {
                 let at = &all[i as usize];
-                let (power, _) = photons.power_within(at.position, at.normal, radius);
                 let (power, area) = match how {
-                    Estimates::AsPublished => (power, PI * f64::from(radius).powi(2)),
+                    Estimates::AsPublished => {
+                        (photons.power_between(at.position, at.normal, [0.0, radius]), PI * f64::from(radius).powi(2))
+                    }
                     Estimates::Corrected(areas) => {
-                        (power - at.power.as_dvec3(), areas.within(at.position, at.normal, radius))
+                        let area = |radius| areas.within(at.position, at.normal, radius);
+                        let power = photons.power_between(at.position, at.normal, [spacing, radius]);
+                        (power, area(radius) - area(spacing))
                     }
                 };
                 // A surface that is smaller than f32 can tell there holds no photons that count.
@@ -103,12 +106,19 @@ impl Layer {
 
     /// The surface that an estimate stands for, m²: that within the radius over the number of estimates there.
     fn share(&self, e: &IrradianceEstimate, areas: &SurfaceAreas) -> f32 {
-        let mut count = 0u32;
-        self.tree.within(e.position, self.radius, |i, _| {
-            count += u32::from(agree(self.estimates[i as usize].normal, e.normal));
-        });
+        let (mut radius, mut count) = (self.radius, 0u32);
+        for _ in 0..6 {
+            count = 0;
+            self.tree.within(e.position, radius, |i, _| {
+                count += u32::from(agree(self.estimates[i as usize].normal, e.normal));
+            });
+            if count >= ENOUGH {
+                break;
+            }
+            radius *= 2.0;
+        }
         // It finds itself at least. One whose surface f32 cannot tell from none still has a weight.
-        let area = areas.within(e.position, e.normal, self.radius) / f64::from(count.max(1));
+        let area = areas.within(e.position, e.normal, radius) / f64::from(count.max(1));
         (area as f32).max(f32::MIN_POSITIVE)
     }
 
@@ -144,6 +154,8 @@ impl Layer {
         });
     }
 }
+
+const ENOUGH: u32 = 8;
 
 /// Memory of an estimate in a layer, bytes.
 pub const BYTES_PER_ESTIMATE: usize = size_of::<IrradianceEstimate>() + BYTES_PER_ENTRY;

@@ -186,8 +186,7 @@ impl Gathering {
         let Some(gatherer) = view.gatherer(slot) else { return };
         let mut scratch = GatherScratch::default();
         for (i, hit) in hits.iter().enumerate() {
-            let mut recorder =
-                Recorder { rays: Vec::new(), room: &mut self.room, unrecorded: &mut self.unrecorded };
+            let mut recorder = Recorder { rays: Vec::new(), room: &mut self.room, unrecorded: &mut self.unrecorded };
             let irradiance = gatherer.irradiance(&hit.point(), hit.seed, &mut scratch, &mut recorder);
             let rays = recorder.rays;
             let weight = hit.weight.as_dvec3() / f64::from(rays_per_pixel);
