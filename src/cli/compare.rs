@@ -150,7 +150,9 @@ impl<'a> Comparison<'a> {
             (None, None) if settings.final_gather != "none" => vec![registry::estimator(&settings.estimator)?],
             (None, None) => ESTIMATORS.iter().filter_map(|e| e.default_estimator()).collect(),
         };
-        let estimators = settings.with_final_gathering(&estimators)?;
+        // Panels say themselves how they gather finally, unless flag or session ask for it on top.
+        let own = of_session && session.render.final_gather.is_none();
+        let estimators = if own { estimators } else { settings.with_final_gathering(&estimators)? };
         if estimators.is_empty() {
             return Err(Failure::Call(format!("{}: no panel has an estimator; give --estimators", args.scene)));
         }

@@ -2,7 +2,6 @@
 
 use crate::cli::inspect_text::{color, number, place, vector};
 use crate::cli::table::Table;
-use crate::final_gather::RecordedRay;
 use crate::math::rgb::{Rgb, mean};
 use crate::render::inspect::gathering::{layer_of, semi_axes};
 use crate::render::inspect::{Gathering, Inspection, RayEnd};
@@ -60,8 +59,8 @@ fn layers(g: &Gathering) -> String {
 
 fn strongest(pass: &Pass, g: &Gathering, limit: usize) -> String {
     let total = g.hits.iter().fold(Rgb::ZERO, |sum, h| sum + h.contribution);
-    let all: Vec<(usize, &RecordedRay)> =
-        g.strongest().into_iter().filter(|(_, r)| r.contribution != Rgb::ZERO).collect();
+    let mut all = g.strongest();
+    all.retain(|at| g.adds(*at) != Rgb::ZERO);
     let shown = if limit == 0 { all.len() } else { limit.min(all.len()) };
     if shown == 0 {
         return "  no ray brings light\n".into();
@@ -79,13 +78,14 @@ fn strongest(pass: &Pass, g: &Gathering, limit: usize) -> String {
         "adds W/(m² sr)",
         "share",
     ]);
-    for (at, ray) in &all[..shown] {
-        let adds = ray.contribution * g.hits[*at].weight;
+    for at in &all[..shown] {
+        let Some(ray) = g.ray(*at) else { continue };
+        let adds = g.adds(*at);
         let share = if mean(total) > 0.0 { 100.0 * mean(adds) / mean(total) } else { 0.0 };
         let meets = ray.hit.as_ref();
         table.row([
             format!("  {}", RayEnd::of(ray).title()),
-            g.hits[*at].hit.to_string(),
+            g.hits[at[0]].hit.to_string(),
             vector(ray.direction),
             meets.map_or("-".into(), |h| place(pass, h.position)),
             meets.map_or("-".into(), |h| number(h.distance)),

@@ -94,6 +94,7 @@ fn values(found: &Inspection) -> String {
     for (e, of) in found.estimators.iter().enumerate() {
         let counting = found.rows.iter().filter(|r| r.weights[e] != 0.0).count();
         let sum = found.sum(e);
+        let photons = found.rows.iter().filter_map(|r| r.contributions.get(e)).fold(Rgb::ZERO, |sum, c| sum + *c);
         let gathered = found.gathering(e).map_or(Rgb::ZERO, |g| g.sum().as_vec3());
         table.row([
             format!("  {}", of.name),
@@ -101,7 +102,7 @@ fn values(found: &Inspection) -> String {
             of.gathered.to_string(),
             counting.to_string(),
             color(of.base),
-            color((sum - of.base - gathered).max(Rgb::ZERO)),
+            color(photons),
             found.gathering(e).map_or("-".into(), |_| color(gathered)),
             color(sum),
             color(of.value),

@@ -2,13 +2,15 @@
 
 use crate::estimate::FinalGathering;
 use crate::final_gather::{GatherCounts, GatherHit, GatherRecorder, GatherScratch, NoHit, RecordedRay, Used};
+use crate::math::elementary::sin_cos;
+use crate::math::frame::tangents;
 use crate::math::rgb::{Rgb, in_f32};
 use crate::photons::irradiance::layer::Ellipse;
 use crate::photons::irradiance::{IrradianceEstimate, PyramidMemory};
 use crate::render::plan::Slot;
 use crate::render::view::ViewHit;
 use crate::render::view_pass::ViewPass;
-use glam::DVec3;
+use glam::{DVec3, Vec2, Vec3};
 use std::collections::BTreeMap;
 use std::f32::consts::PI;
 
@@ -151,14 +153,25 @@ impl Gathering {
         self.hits.iter().map(|h| h.exact).sum()
     }
 
-    /// Every ray with the index of its entry in [`Gathering::hits`], by falling contribution to the pixel's mean channel.
-    pub fn strongest(&self) -> Vec<(usize, &RecordedRay)> {
+    /// Every ray as the indices of its entry in [`Gathering::hits`] and among the rays there, by falling contribution to
+    /// the pixel's mean channel.
+    pub fn strongest(&self) -> Vec<[usize; 2]> {
         let each = self.hits.iter().enumerate();
-        let mut all: Vec<(usize, &RecordedRay)> = each.flat_map(|(i, h)| h.rays.iter().map(move |r| (i, r))).collect();
-        let key = |(hit, ray): &(usize, &RecordedRay)| (ray.contribution * self.hits[*hit].weight).element_sum();
+        let mut all: Vec<[usize; 2]> = each.flat_map(|(h, of)| (0..of.rays.len()).map(move |r| [h, r])).collect();
+        let key = |at: &[usize; 2]| self.adds(*at).element_sum();
         // The sort is stable: rays of one strength stay in their order.
         all.sort_by(|a, b| key(b).total_cmp(&key(a)));
         all
+    }
+
+    /// The ray of those indices.
+    pub fn ray(&self, [hit, ray]: [usize; 2]) -> Option<&RecordedRay> {
+        self.hits.get(hit)?.rays.get(ray)
+    }
+
+    /// What the ray of those indices adds to the pixel, W/(m² sr).
+    pub fn adds(&self, at: [usize; 2]) -> Rgb {
+        self.ray(at).map_or(Rgb::ZERO, |ray| ray.contribution * self.hits[at[0]].weight)
     }
 
     /// How many rays ended in which way; ways that none took are not there.
@@ -219,6 +232,27 @@ pub fn semi_axes(hit: &GatherHit, floor: f32) -> [f32; 2] {
     let longest = Ellipse::new(hit.position, hit.footprint, hit.normal, floor);
     let area = longest.transform.inverse_area.recip();
     [longest.longest(), area / (PI * longest.longest())]
+}
+
+/// The disc of directions that a ray stands for as the hemisphere over a surface of unit `normal` shows it, seen along the
+/// normal: a polygon in the unit disc, along the tangents of [`tangents`]. What lies below the surface is drawn on the rim.
+/// A ray without a disc gives a single point.
+pub fn disc_of_directions(normal: Vec3, ray: &RecordedRay, sides: usize) -> Vec<Vec2> {
+    let (x, y) = tangents(normal);
+    let seen = |direction: Vec3| {
+        let flat = Vec2::new(direction.dot(x), direction.dot(y));
+        if direction.dot(normal) < 0.0 { flat.normalize_or_zero() } else { flat }
+    };
+    if ray.radius <= 0.0 {
+        return vec![seen(ray.direction)];
+    }
+    let (t, b) = tangents(ray.direction);
+    let turn = std::f32::consts::TAU / sides as f32;
+    let on_rim = |i: usize| {
+        let (sin, cos) = sin_cos(i as f32 * turn);
+        seen((ray.direction + (t * cos + b * sin) * ray.radius).normalize())
+    };
+    (0..sides).map(on_rim).collect()
 }
 
 /// Final gatherings of those slots that gather finally, without hits yet.

@@ -204,15 +204,34 @@ fn gather_rays_name_the_estimates_that_they_average() {
             }
             assert_eq!(g.ends().values().sum::<usize>(), recorded);
             assert_eq!(g.rays_by_layer().iter().sum::<usize>(), named);
-            assert!(g.strongest().is_sorted_by(|a, b| {
-                let adds = |(hit, ray): &(usize, &crate::final_gather::RecordedRay)| {
-                    (ray.contribution * g.hits[*hit].weight).element_sum()
-                };
-                adds(a) >= adds(b)
-            }));
+            assert!(g.strongest().is_sorted_by(|a, b| g.adds(*a).element_sum() >= g.adds(*b).element_sum()));
+            assert_eq!(g.strongest().len(), recorded);
         }
     }
     assert!(averaged > 50 && nearest > 50, "{averaged} {nearest}");
+}
+
+/// The discs of directions of all rays have the area that they own: seen along the normal `π r² cos θ`, together π.
+#[test]
+fn discs_of_directions_fill_the_hemisphere_seen_along_its_normal() {
+    let names = "integrated+ray-differentials:rays=400,integrated+classic:rays=5";
+    let list = estimators(names).expect("registered");
+    let pass = pass("cornell", &by("overlap"), names, 0);
+    let found = inspect(&pass, &list, [20, 30]).expect("inside");
+    let gathered = &found.gatherings[0].hits[0];
+    let normal = found.hits[gathered.hit].view.query.normal;
+    let mut area = 0.0;
+    for ray in &gathered.rays {
+        let disc = gathering::disc_of_directions(normal, ray, 64);
+        let next = disc.iter().cycle().skip(1);
+        let own: f32 = disc.iter().zip(next).map(|(a, b)| a.perp_dot(*b)).sum::<f32>() / 2.0;
+        assert!(own > 0.0 && disc.iter().all(|p| p.length() <= 1.0 + 1e-5));
+        area += f64::from(own);
+    }
+    // Beyond the rim there is nothing to fill, and discs are flat where the sphere is not.
+    assert!((area / PI - 1.0).abs() < 0.1, "{area}");
+    let point = gathering::disc_of_directions(normal, &found.gatherings[1].hits[0].rays[0], 64);
+    assert_eq!(point.len(), 1);
 }
 
 #[test]
