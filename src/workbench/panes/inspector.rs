@@ -110,36 +110,52 @@ fn gathered(ui: &mut Ui, inspector: &Inspector, found: &Inspected) {
     }
 }
 
-/// For each estimator: light without photons, the rows' sum, what final gathering brings where it runs, and the pixel of
-/// the pass.
+/// For each estimator: light without photons, the rows' sum, and the pixel of the pass.
 fn sums(ui: &mut Ui, found: &Inspected, colors: &[Color32]) {
-    let gathers = !found.inspection.gatherings.is_empty();
-    egui::Grid::new("sums").num_columns(if gathers { 5 } else { 4 }).striped(true).show(ui, |ui| {
-        for (title, tip) in [
-            ("", ""),
-            ("no photons", "direct light by shadow rays, and lights that are seen; mean channel, W/(m² sr)"),
-            ("+ rows", "sum of the photon table's contributions"),
-            ("+ rays", "what gather rays bring"),
-            ("= pixel", "the pixel of this pass's image, by the code that renders"),
-        ] {
-            if gathers || title != "+ rays" {
-                ui.weak(title).on_hover_text(tip);
-            }
+    if !found.inspection.gatherings.is_empty() {
+        return sums_with_rays(ui, found, colors);
+    }
+    egui::Grid::new("sums").num_columns(4).striped(true).show(ui, |ui| {
+        for (title, tip) in [("", ""), ("no photons", NO_PHOTONS), ("+ rows", ROWS), ("= pixel", PIXEL)] {
+            ui.weak(title).on_hover_text(tip);
         }
         ui.end_row();
         for (e, estimator) in found.inspection.estimators.iter().enumerate() {
             ui.colored_label(colors[e], mono(short_name(&estimator.name)).color(colors[e]));
             let base = f64::from(mean(estimator.base));
-            let photons = found.inspection.rows.iter().filter_map(|r| r.contributions.get(e));
-            let rows: f64 = photons.map(|c| f64::from(mean(*c))).sum();
+            let rows = f64::from(mean(found.inspection.sum(e))) - base;
             ui.label(mono(number(base)));
             ui.label(mono(number(rows)));
-            if gathers {
-                let rays = found.inspection.gathering(e).map(|g| g.sum().element_sum() / 3.0);
-                ui.label(mono(rays.map_or("-".into(), number)));
-            }
             ui.label(mono(number(f64::from(mean(estimator.value)))));
             ui.end_row();
         }
     });
+}
+
+const NO_PHOTONS: &str = "direct light by shadow rays, and lights that are seen; mean channel, W/(m² sr)";
+const ROWS: &str = "sum of the photon table's contributions";
+const RAYS: &str = "what gather rays bring";
+const PIXEL: &str = "the pixel of this pass's image, by the code that renders";
+
+/// The same with what gather rays bring; names are long then and have lines of their own.
+fn sums_with_rays(ui: &mut Ui, found: &Inspected, colors: &[Color32]) {
+    for (e, estimator) in found.inspection.estimators.iter().enumerate() {
+        ui.colored_label(colors[e], mono(short_name(&estimator.name)).color(colors[e]));
+        ui.horizontal_wrapped(|ui| {
+            ui.spacing_mut().item_spacing.x = 4.0;
+            let photons = found.inspection.rows.iter().filter_map(|r| r.contributions.get(e));
+            let rays = found.inspection.gathering(e).map(|g| g.sum().element_sum() / 3.0);
+            for (title, value, tip) in [
+                ("no photons", Some(f64::from(mean(estimator.base))), NO_PHOTONS),
+                ("+ rows", Some(photons.map(|c| f64::from(mean(*c))).sum()), ROWS),
+                ("+ rays", rays, RAYS),
+                ("= pixel", Some(f64::from(mean(estimator.value))), PIXEL),
+            ] {
+                if let Some(value) = value {
+                    ui.weak(title).on_hover_text(tip);
+                    ui.label(mono(number(value)));
+                }
+            }
+        });
+    }
 }
