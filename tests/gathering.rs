@@ -127,3 +127,32 @@ fn inspect_tells_every_ray() {
     let shares: Vec<f64> = rows[1..4].iter().filter_map(|r| share(r)).collect();
     assert!(shares.len() == 3 && shares.is_sorted_by(|a, b| a >= b) && shares[0] <= 100.0, "{table}");
 }
+
+/// Panels are those of the methods that are asked for, by flag or in a session; a panel that names its own keeps it.
+#[test]
+fn the_window_and_its_session_gather_as_they_are_told() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let png = folder.path().join("shot.png");
+    let png = png.to_str().expect("plain");
+    let more = ["--passes", "1", "--window", "800x500", "--pixel", "12,20", "--ray", "2", "--layer", "1"];
+    let overlays = ["--overlays", "gather_rays,irradiance", "-o", png, "--quiet"];
+    let shot = |methods: &str| {
+        cusp(&[&["shot", "cornell", "--final-gather", methods][..], &more, &overlays].concat());
+        image::open(png).expect("a PNG").to_rgb8()
+    };
+    let [one, two] = ["precomputed", "precomputed,ray-differentials"].map(shot);
+    assert_eq!((one.width(), one.height()), (800, 500));
+    assert_ne!(one, two, "another panel");
+
+    let session = folder.path().join("a.toml");
+    let text = "session = 1\nscene = \"cornell\"\n[render]\nfinal_gather = \"classic:rays=3\"\n\
+                [[panels]]\nestimator = \"integrated\"\n[[panels]]\nestimator = \"regular+precomputed:rays=5\"\n";
+    std::fs::write(&session, text).expect("writes");
+    let out = folder.path().join("out");
+    let (session, out) = (session.to_str().expect("plain"), out.to_str().expect("plain"));
+    let compared = cusp(&["compare", session, "--out", out, "--json"]);
+    let report: Value = serde_json::from_slice(&compared.stdout).expect("JSON");
+    let methods: Vec<&str> =
+        report["estimators"].as_array().expect("a list").iter().filter_map(|e| e["final_gathering"].as_str()).collect();
+    assert_eq!(methods, ["classic:rays=3", "precomputed:rays=5"]);
+}

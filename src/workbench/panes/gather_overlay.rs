@@ -16,7 +16,7 @@ const RAYS: usize = 1000;
 /// Estimates in a panel at most; more would hide each other.
 const ESTIMATES: usize = 3000;
 /// Estimates of which the whole discs are drawn too, at most.
-const DISCS: usize = 120;
+const DISCS: usize = 24;
 /// Radius of a ray's end without a footprint, points.
 const POINT: f32 = 2.0;
 
