@@ -35,6 +35,9 @@ pub struct VisibleEstimate {
     pub normal: Vec3,
     /// Mean channel of the irradiance, W/m².
     pub irradiance: f32,
+    /// Radius of a disc as large as the surface that it stands for, metres; as published, where all count the same, half of
+    /// the distance that estimates keep.
+    pub own_radius: f32,
 }
 
 /// Estimates that are not hidden, in an order that thins evenly.
@@ -50,8 +53,6 @@ pub struct VisibleEstimates {
     pub all: usize,
     /// Radius of the discs, metres.
     pub radius: f32,
-    /// Distance below which there is no other estimate of a related surface, metres.
-    pub spacing: f32,
     /// Smallest and largest irradiance above 0 that is seen, the mean channel, W/m²; equal if there is none.
     pub range: [f32; 2],
     /// Memory while the pyramid was made.
@@ -78,7 +79,13 @@ impl VisibleEstimates {
             .into_iter()
             .take(MOST)
             .filter(|(_, e)| is_seen(pass, e.position, e.normal))
-            .map(|(_, e)| VisibleEstimate { position: e.position, normal: e.normal, irradiance: mean(e.irradiance) })
+            .map(|(_, e)| {
+                let own_radius = match f.estimates_as_published {
+                    true => spacing / 2.0,
+                    false => (e.area / std::f32::consts::PI).sqrt().min(layer.radius()),
+                };
+                VisibleEstimate { position: e.position, normal: e.normal, irradiance: mean(e.irradiance), own_radius }
+            })
             .collect();
         let lit = || estimates.iter().map(|e| e.irradiance).filter(|e| *e > 0.0);
         let high = lit().fold(0.0, f32::max);
@@ -89,7 +96,6 @@ impl VisibleEstimates {
             layer: [index, count],
             all: layer.estimates().len(),
             radius: layer.radius(),
-            spacing,
             range: [low, high],
             memory: *pyramid.memory(),
             estimates,

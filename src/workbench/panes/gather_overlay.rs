@@ -121,7 +121,7 @@ pub(super) fn estimates(projection: &Projection, painter: &Painter) {
         Color32::from_rgb(r, g, b)
     };
     for e in &seen {
-        if let Some(part) = projection.ellipse(e.position, disc(e.normal, all.spacing * 0.5)) {
+        if let Some(part) = projection.ellipse(e.position, disc(e.normal, e.own_radius)) {
             painter.add(Shape::convex_polygon(part, color(e.irradiance), Stroke::NONE));
         }
     }
