@@ -20,11 +20,8 @@ pub enum FinalGatherMethod {
 
 impl FinalGatherMethod {
     /// All of them, with their names in flags and files.
-    pub const ALL: [(&'static str, Self); 3] = [
-        ("classic", Self::Classic),
-        ("precomputed", Self::Precomputed),
-        ("ray-differentials", Self::RayDifferentials),
-    ];
+    pub const ALL: [(&'static str, Self); 3] =
+        [("classic", Self::Classic), ("precomputed", Self::Precomputed), ("ray-differentials", Self::RayDifferentials)];
 
     /// Its name in flags and files.
     pub fn name(self) -> &'static str {
@@ -47,11 +44,8 @@ pub enum GatherPattern {
     Spiral,
 }
 
-const PATTERNS: [(&str, GatherPattern); 3] = [
-    ("spiral", GatherPattern::Spiral),
-    ("sobol", GatherPattern::Sobol),
-    ("stratified", GatherPattern::Stratified),
-];
+const PATTERNS: [(&str, GatherPattern); 3] =
+    [("spiral", GatherPattern::Spiral), ("sobol", GatherPattern::Sobol), ("stratified", GatherPattern::Stratified)];
 
 /// Which estimates under a footprint count.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -62,8 +56,7 @@ pub enum FootprintReach {
     Facing,
 }
 
-const REACHES: [(&str, FootprintReach); 2] =
-    [("surface", FootprintReach::Surface), ("facing", FootprintReach::Facing)];
+const REACHES: [(&str, FootprintReach); 2] = [("surface", FootprintReach::Surface), ("facing", FootprintReach::Facing)];
 
 const CORRECTED: [(&str, bool); 2] = [("corrected", false), ("as_published", true)];
 

@@ -77,7 +77,11 @@ fn below_one(x: f64) -> f32 {
 /// counts as [`GRAZING_COSINE`] at least.
 pub fn footprint_radius(rays: u32, cos: f32, as_published: bool) -> f32 {
     let n = rays as f32;
-    if as_published { (2.0 * PI / n).sqrt() / cos.max(GRAZING_COSINE) } else { cone_radius(cosine_solid_angle(n, cos).0) }
+    if as_published {
+        (2.0 * PI / n).sqrt() / cos.max(GRAZING_COSINE)
+    } else {
+        cone_radius(cosine_solid_angle(n, cos).0)
+    }
 }
 
 #[cfg(test)]
@@ -123,9 +127,8 @@ mod tests {
             let mut seen = std::collections::BTreeSet::new();
             for i in 0..rays {
                 let [u, v] = directions.square(i);
-                let ring = (0..rings)
-                    .find(|r| f64::from(u) * (n as f64) < ((r + 1) * n / rings) as f64)
-                    .expect("a ring");
+                let ring =
+                    (0..rings).find(|r| f64::from(u) * (n as f64) < ((r + 1) * n / rings) as f64).expect("a ring");
                 let count = (ring + 1) * n / rings - ring * n / rings;
                 seen.insert((ring, (f64::from(v) * count as f64) as u64));
             }

@@ -76,12 +76,7 @@ impl GatherTracer<'_> {
     ///
     /// # Errors
     /// How it ended without a diffuse surface.
-    pub fn trace(
-        &self,
-        ray: Ray,
-        differential: Differential,
-        choose: impl Fn(u32) -> f32,
-    ) -> Result<GatherHit, NoHit> {
+    pub fn trace(&self, ray: Ray, differential: Differential, choose: impl Fn(u32) -> f32) -> Result<GatherHit, NoHit> {
         let scene = self.scene;
         let carries = !differential.is_none();
         let (mut ray, mut d) = (ray, differential);

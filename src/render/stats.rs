@@ -44,8 +44,19 @@ impl Seconds {
 
     /// Sum of all parts.
     pub fn sum(&self) -> f64 {
-        let Self { load, bvh, plan, photon_trace, map_build, view_trace, gather, estimate, final_gather, other, total: _ } =
-            *self;
+        let Self {
+            load,
+            bvh,
+            plan,
+            photon_trace,
+            map_build,
+            view_trace,
+            gather,
+            estimate,
+            final_gather,
+            other,
+            total: _,
+        } = *self;
         load + bvh + plan + photon_trace + map_build + view_trace + gather + estimate + final_gather + other
     }
 }

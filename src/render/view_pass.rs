@@ -394,8 +394,7 @@ impl ViewPass<'_> {
     pub fn gatherer(&self, slot: &Slot) -> Option<FinalGatherer<'_>> {
         let t = &self.tracer;
         let settings = t.plan.final_gathering(slot.estimator)?;
-        let tracer =
-            GatherTracer { scene: t.scene, intersector: t.intersector, max_depth: t.settings.max_depth };
+        let tracer = GatherTracer { scene: t.scene, intersector: t.intersector, max_depth: t.settings.max_depth };
         Some(FinalGatherer::new(tracer, settings, self.gathering))
     }
 

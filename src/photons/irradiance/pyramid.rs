@@ -1,8 +1,8 @@
 //! The irradiance pyramid: layers of growing radius, each made of the one before.
 
+use crate::photons::irradiance::GlobalPhotons;
 use crate::photons::irradiance::layer::{Estimates, Layer};
 use crate::photons::irradiance::surface_area::SurfaceAreas;
-use crate::photons::irradiance::GlobalPhotons;
 use crate::scene::Scene;
 use serde::Serialize;
 use std::time::Instant;

@@ -23,9 +23,8 @@ impl<'a> SurfaceAreas<'a> {
     /// Those of a scene.
     pub fn new(scene: &'a Scene) -> Self {
         let g = &scene.geometry;
-        let diffuse: Vec<u32> = (0..g.primitive_count() as u32)
-            .filter(|&i| scene.materials[g.material(i as usize)].is_diffuse())
-            .collect();
+        let diffuse: Vec<u32> =
+            (0..g.primitive_count() as u32).filter(|&i| scene.materials[g.material(i as usize)].is_diffuse()).collect();
         let tree = OverlapTree::new(diffuse.iter().map(|&i| {
             let (low, high) = g.bounds(i as usize);
             ((low + high) / 2.0, (high - low) / 2.0)

@@ -22,7 +22,11 @@ pub fn chart(sections: &[Section], head: &Head, note: String) -> Chart {
         for classic in s.rows.iter().filter(|r| r.way == Way::Classic) {
             let heading = format!(
                 "{} photons, radius {} m, {} rays: classic {:.2} s, error {}",
-                s.photons_emitted, s.printed.radius, classic.rays, classic.total.median, error(classic)
+                s.photons_emitted,
+                s.printed.radius,
+                classic.rays,
+                classic.total.median,
+                error(classic)
             );
             bars.push(Bar { label: heading, segments: vec![], number: String::new() });
             for r in s.rows.iter().filter(|r| r.rays == classic.rays && r.way != Way::Classic) {

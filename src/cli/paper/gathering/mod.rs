@@ -2,11 +2,11 @@
 //! Differentials*).
 
 mod chart;
-//mod drawing;
-//pub mod figure_1;
-//pub mod figure_2;
-//pub mod figure_3;
-//pub mod figures_4_5;
+mod drawing;
+pub mod figure_1;
+pub mod figure_2;
+pub mod figure_3;
+pub mod figures_4_5;
 mod layers;
 mod measured;
 mod methods;
@@ -16,4 +16,4 @@ mod reference;
 mod room;
 mod rows;
 pub mod table;
-//mod table_top;
+mod table_top;

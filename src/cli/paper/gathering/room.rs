@@ -15,6 +15,10 @@ pub const ONE_LARGE_LIGHT: &str = "two_lights with one large light";
 /// Factor on the edges of the light that stays: it fills the screen below it, and no more, so that it stays hidden.
 const LARGER: f64 = 1.5;
 
+/// Shadow rays to the light from each view hit: so many that the noise of direct light does not hide that of the gather.
+/// They cost little beside hundreds of gather rays.
+const SHADOW_RAYS: i64 = 64;
+
 /// The built-in room.
 ///
 /// # Errors
@@ -55,6 +59,7 @@ pub fn settings(scene: &Scene, flags: &PaperFlags, photons: i64, size: [u32; 2])
     let mut render = RenderFile::default();
     common.onto(&mut render);
     render.photons = Some(photons);
+    render.shadow_rays = Some(SHADOW_RAYS);
     let size = Some(common.size.unwrap_or(size));
     Ok(RenderSettings::new(scene, &render, size, common.seed.unwrap_or(1))?)
 }

@@ -94,8 +94,11 @@ fn row(cell: &Cell, classic: &[f64], printed: &PrintedTable, truth: &Truth) -> R
     let totals = cell.totals();
     let ratios: Vec<f64> = totals.iter().zip(classic).map(|(own, base)| own / base.max(f64::MIN_POSITIVE)).collect();
     let line = printed.rows.iter().find(|r| r.rays == cell.rays);
-    let in_print = |r: &PrintedRow| if cell.way == Way::Classic { r.classic } else { r.ray_differentials };
-    let printed_total = line.map_or(0.0, in_print);
+    let in_print = |r: &PrintedRow| match cell.way {
+        Way::Classic => (r.classic, 1.0),
+        _ => (r.ray_differentials, r.ratio()),
+    };
+    let (printed_total, printed_ratio) = line.map_or((0.0, 0.0), in_print);
     Row {
         rays: cell.rays,
         way: cell.way,
@@ -107,7 +110,7 @@ fn row(cell: &Cell, classic: &[f64], printed: &PrintedTable, truth: &Truth) -> R
         total: Spread::of(&totals),
         ratio_to_classic: Spread::of(&ratios),
         printed_total,
-        printed_ratio: line.map_or(0.0, |r| printed_total / r.classic),
+        printed_ratio,
         error: truth.error(&cell.image),
     }
 }
@@ -116,8 +119,19 @@ fn row(cell: &Cell, classic: &[f64], printed: &PrintedTable, truth: &Truth) -> R
 pub fn text(section: &Section) -> String {
     let p = &section.printed;
     let mut table = Table::new([
-        "rays, way", "tree s", "first layer s", "others s", "image s", "total s", "x classic", "least", "largest",
-        "printed s", "printed x", "error", "mean",
+        "rays, way",
+        "tree s",
+        "first layer s",
+        "others s",
+        "image s",
+        "total s",
+        "x classic",
+        "least",
+        "largest",
+        "printed s",
+        "printed x",
+        "error",
+        "mean",
     ]);
     for r in &section.rows {
         table.row([
@@ -150,7 +164,14 @@ pub fn text(section: &Section) -> String {
 /// Memory of all pyramids for people.
 pub fn memory_text(sections: &[Section]) -> String {
     let mut table = Table::new([
-        "photons, radius, pyramid", "photon map MB", "peak MB", "layers MB", "layers", "largest MB", "by layer MB", "saved",
+        "photons, radius, pyramid",
+        "photon map MB",
+        "peak MB",
+        "layers MB",
+        "layers",
+        "largest MB",
+        "by layer MB",
+        "saved",
     ]);
     let mb = |bytes: u64| format!("{:.1}", bytes as f64 / 1e6);
     for s in sections {
@@ -181,9 +202,10 @@ pub fn summary(sections: &[Section]) -> String {
         let error = |r: &Row| r.error.map(|e| e.rmse);
         let better = own.iter().filter(|r| {
             let classic = sections.iter().find_map(|s| {
-                s.rows.iter().any(|o| std::ptr::eq(o, **r)).then(|| {
-                    s.rows.iter().find(|c| c.way == Way::Classic && c.rays == r.rays)
-                })?
+                s.rows
+                    .iter()
+                    .any(|o| std::ptr::eq(o, **r))
+                    .then(|| s.rows.iter().find(|c| c.way == Way::Classic && c.rays == r.rays))?
             });
             matches!((error(r), classic.and_then(error)), (Some(own), Some(base)) if own < base)
         });
@@ -222,9 +244,8 @@ pub fn csv(sections: &[Section]) -> String {
         for r in &s.rows {
             let memory = s.memory.iter().find(|m| m.way == r.way).map(|m| &m.bytes);
             let bytes = |f: &dyn Fn(&PyramidBytes) -> u64| memory.map_or(String::new(), |m| f(m).to_string());
-            let error = |f: &dyn Fn(&ErrorMetrics) -> f64| {
-                r.error.as_ref().map_or(String::new(), |e| format!("{:.6}", f(e)))
-            };
+            let error =
+                |f: &dyn Fn(&ErrorMetrics) -> f64| r.error.as_ref().map_or(String::new(), |e| format!("{:.6}", f(e)));
             let numbers: Vec<String> = [
                 s.emission.median,
                 r.tree.median,
