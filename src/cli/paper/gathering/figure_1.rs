@@ -4,7 +4,7 @@
 use crate::cli::failure::Failure;
 use crate::cli::paper::PaperFlags;
 use crate::cli::paper::gathering::drawing::Window;
-use crate::cli::paper::gathering::output::{Head, counts};
+use crate::cli::paper::gathering::output::{Head, NO_IMAGE, counts};
 use crate::cli::paper::gathering::room::settings;
 use crate::cli::paper::gathering::table_top::{TableTop, TopTruth};
 use crate::cli::paper::output::Done;
@@ -158,7 +158,7 @@ fn places(half: Vec2) -> Vec<Vec2> {
 /// A wrong flag, a file that cannot be written, or an interruption.
 pub fn run(item: &'static str, flags: &PaperFlags, folder: &Path) -> Result<Done, Failure> {
     let top = TableTop::new()?;
-    let settings = settings(&top.scene, flags, flags.photons.unwrap_or(PHOTONS), [1, 1])?;
+    let settings = settings(&top.scene, flags, flags.photons.unwrap_or(PHOTONS), NO_IMAGE)?;
     let truth = TopTruth::new(&top, settings.max_depth, flags.quiet || flags.json, item)?;
     let stored = emitted(&top.scene, &settings);
     if interrupted() {
@@ -286,19 +286,22 @@ fn draw(found: &Found, truth: &TopTruth, at: Vec2, rows: &[Row], value: f64, hea
         window.circle(at, RADIUS, 2.0, if i == 2 { [255, 210, 60] } else { [120, 20, 110] }, 1.0);
         window.dot(at, 4.0, [120, 20, 110]);
     }
-    let percent = |r: &Row| format!("{:.1} %", 100.0 * r.ratio);
+    let percent = |r: &Row| format!("{:.1} % ({:.1} %)", 100.0 * r.ratio, 100.0 * r.mean_ratio);
     let lines = [
         [
-            format!("whole disc: {} of the truth", percent(&rows[0])),
-            format!("surface in the disc: {}", percent(&rows[1])),
+            format!("over the whole disc: {} of the truth", percent(&rows[0])),
+            format!("over the surface in the disc: {}", percent(&rows[1])),
         ],
         [format!("as published: {} of the truth", percent(&rows[2])), format!("corrected: {}", percent(&rows[3]))],
-        [format!("{value:.4} W/m² over the surface"), "red: what is divided by, but has no surface".into()],
+        [
+            format!("{value:.4} W/m² over the surface in the disc"),
+            "red: divided by, but no surface; in brackets means over all edges".into(),
+        ],
     ];
     for (i, two) in lines.iter().enumerate() {
         for (l, line) in two.iter().enumerate() {
             let x = GAP + i as u32 * (SIDE + GAP);
-            canvas.text(x, ABOVE + SIDE + 8 + 24 * l as u32, SIDE, 17.0, INK, Face::Proportional, line);
+            canvas.text(x, ABOVE + SIDE + 8 + 24 * l as u32, SIDE, 15.5, INK, Face::Proportional, line);
         }
     }
     canvas

@@ -4,7 +4,7 @@ use crate::cli::failure::Failure;
 use crate::cli::paper::PaperFlags;
 use crate::cli::paper::gathering::drawing::Window;
 use crate::cli::paper::gathering::figure_1::emitted;
-use crate::cli::paper::gathering::output::{Head, counts};
+use crate::cli::paper::gathering::output::{Head, NO_IMAGE, counts};
 use crate::cli::paper::gathering::room::{settings, two_lights};
 use crate::cli::paper::output::Done;
 use crate::cli::progress::interrupted;
@@ -89,7 +89,7 @@ fn least_distance(layer: &Layer) -> Option<f32> {
 /// A wrong flag, a file that cannot be written, or an interruption.
 pub fn run(item: &'static str, flags: &PaperFlags, folder: &Path) -> Result<Done, Failure> {
     let scene = two_lights()?;
-    let settings = settings(&scene, flags, flags.photons.unwrap_or(PHOTONS), [1, 1])?;
+    let settings = settings(&scene, flags, flags.photons.unwrap_or(PHOTONS), NO_IMAGE)?;
     let stored = emitted(&scene, &settings);
     if interrupted() {
         return Err(Failure::Interrupted(format!("nothing of {item} was written")));
@@ -221,7 +221,7 @@ fn draw(photons: &[Vec2], layers: &[Vec<Vec2>], rows: &[Row], head: &Head) -> Ca
             }
             _ => {
                 for p in second {
-                    window.disc(*p, RADIUS * GROWTH, SECOND, 0.05);
+                    window.disc(*p, RADIUS * GROWTH, SECOND, 0.02);
                     window.circle(*p, RADIUS * GROWTH, 1.5, SECOND, 0.6);
                     window.dot(*p, 4.0, SECOND);
                 }

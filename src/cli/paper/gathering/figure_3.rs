@@ -3,7 +3,7 @@
 use crate::cli::failure::Failure;
 use crate::cli::paper::PaperFlags;
 use crate::cli::paper::gathering::drawing::Window;
-use crate::cli::paper::gathering::output::Head;
+use crate::cli::paper::gathering::output::{Head, NO_IMAGE};
 use crate::cli::paper::gathering::room::{settings, two_lights};
 use crate::cli::paper::output::Done;
 use crate::cli::table::Table;
@@ -140,7 +140,7 @@ struct Report<'a> {
 /// A wrong flag, or a file that cannot be written.
 pub fn run(item: &'static str, flags: &PaperFlags, folder: &Path) -> Result<Done, Failure> {
     let scene = two_lights()?;
-    let settings = settings(&scene, flags, flags.photons.unwrap_or(1), [1, 1])?;
+    let settings = settings(&scene, flags, flags.photons.unwrap_or(1), NO_IMAGE)?;
     let cases: Vec<_> = WIDTHS.iter().flat_map(|w| PATTERNS.iter().map(move |p| (*w, *p))).collect();
     let made: Vec<(Coverage, Vec<f32>)> = cases
         .par_iter()

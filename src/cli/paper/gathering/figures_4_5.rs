@@ -4,7 +4,7 @@ use crate::cli::failure::Failure;
 use crate::cli::paper::PaperFlags;
 use crate::cli::paper::gathering::methods::Way;
 use crate::cli::paper::gathering::output::{Head, counts};
-use crate::cli::paper::gathering::reference::{Truth, TruthFacts};
+use crate::cli::paper::gathering::reference::{PATHS, Truth, TruthFacts};
 use crate::cli::paper::gathering::room::{settings, two_lights};
 use crate::cli::paper::output::Done;
 use crate::cli::progress::{ProgressWatch, bar, interrupted};
@@ -83,7 +83,7 @@ fn run(
     let settings = settings(&scene, flags, flags.photons.unwrap_or(PHOTONS), SIZE)?;
     let hidden = flags.quiet || flags.json;
     let stopped = || Failure::Interrupted(format!("nothing of {item} was written"));
-    let truth = Truth::new(&scene, settings.size, settings.max_depth, hidden, item)?;
+    let truth = Truth::new(&scene, settings.size, settings.max_depth, PATHS, hidden, item)?;
     let estimators: Result<Vec<Box<dyn Estimator>>, _> =
         Way::SHOWN.iter().map(|way| way.estimator(rays, RADIUS)).collect();
     let estimators = estimators?;

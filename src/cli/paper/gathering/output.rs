@@ -11,6 +11,9 @@ use crate::scene::Scene;
 use serde::Serialize;
 use std::path::Path;
 
+/// Size in the settings of what is no image.
+pub const NO_IMAGE: [u32; 2] = [1, 1];
+
 /// The start of an item's JSON.
 #[derive(Clone, Debug, Serialize)]
 pub struct Head {
@@ -48,8 +51,10 @@ impl Head {
     /// Scene and settings in a line, for texts and pictures.
     pub fn subtitle(&self) -> String {
         let s = &self.settings;
-        let [w, h] = s.size;
-        format!("{}: {}, {w}x{h} pixels, k = {}, seed {}", self.source, self.provenance.scene, s.k, s.seed)
+        let (source, scene, [w, h]) = (self.source, &self.provenance.scene, s.size);
+        // What has no image was given one pixel.
+        let pixels = if s.size == NO_IMAGE { String::new() } else { format!(", {w}x{h} pixels, k = {}", s.k) };
+        format!("{source}: {scene}{pixels}, seed {}", s.seed)
     }
 
     /// Writes the item's files. `text` follows the item's first line on the terminal.

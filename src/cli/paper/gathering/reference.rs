@@ -13,8 +13,8 @@ use serde::Serialize;
 
 /// Noise over the mean at which a reference is good enough.
 const NOISE: f64 = 0.01;
-/// Paths for each pixel at most; a number, not a time, so that errors do not depend on the machine.
-const PATHS: u32 = 4096;
+/// Paths for each pixel of an image of the room at most.
+pub const PATHS: u32 = 4096;
 /// Seed of the references, which no study uses: their batches are then those of these items alone.
 const SEED: u64 = 3;
 /// Rays across a pixel that look for edges.
@@ -48,15 +48,23 @@ pub struct TruthFacts {
 }
 
 impl Truth {
-    /// Traces it, or goes on from what the cache has.
+    /// Traces it with at most `most` paths for each pixel (a number, not a time, so that errors do not depend on the
+    /// machine), or goes on from what the cache has.
     ///
     /// # Errors
     /// An interruption.
-    pub fn new(scene: &Scene, size: [u32; 2], max_depth: u32, hidden: bool, item: &str) -> Result<Self, Failure> {
+    pub fn new(
+        scene: &Scene,
+        size: [u32; 2],
+        max_depth: u32,
+        most: u32,
+        hidden: bool,
+        item: &str,
+    ) -> Result<Self, Failure> {
         let intersector = Intersector::new(&scene.geometry, scene.radius);
         let settings = ReferenceSettings { size, light: LightPart::All, max_depth, seed: SEED };
         let paths = crate::measure::tracer::Tracer::new(scene, &intersector, settings).samples();
-        let until = Until { noise: Some(NOISE), seconds: None, batches: Some((PATHS / paths.max(1)).max(2)) };
+        let until = Until { noise: Some(NOISE), seconds: None, batches: Some((most / paths.max(1)).max(2)) };
         let progress = bar(u64::from(until.batches.unwrap_or(1)), "reference", hidden);
         let folder = cache::default_folder();
         let (reference, warnings) = cache::cached_reference(

@@ -9,7 +9,7 @@ use crate::cli::paper::gathering::measured::measure;
 use crate::cli::paper::gathering::methods::Way;
 use crate::cli::paper::gathering::output::Head;
 use crate::cli::paper::gathering::printed::{PRINTED, TABLES};
-use crate::cli::paper::gathering::reference::{Truth, TruthFacts};
+use crate::cli::paper::gathering::reference::{PATHS, Truth, TruthFacts};
 use crate::cli::paper::gathering::room::{one_large_light, settings};
 use crate::cli::paper::gathering::rows::{Section, csv, memory_text, summary, text};
 use crate::cli::paper::output::Done;
@@ -45,7 +45,7 @@ pub fn run(item: &'static str, flags: &PaperFlags, folder: &Path) -> Result<Done
     // The flag is the number of the first table; the others keep their share of it.
     let asked = settings(&scene, flags, flags.photons.unwrap_or(largest), SIZE)?;
     let stopped = || Failure::Interrupted(format!("nothing of {item} was written"));
-    let truth = Truth::new(&scene, asked.size, asked.max_depth, hidden, item)?;
+    let truth = Truth::new(&scene, asked.size, asked.max_depth, PATHS, hidden, item)?;
     let cells = PRINTED.iter().map(|t| t.rows.len() * Way::TIMED.len()).sum::<usize>();
     let steps = tiles(Rect::whole(asked.size)).len() * cells * repeats as usize;
     let progress = bar(steps as u64, item, hidden);

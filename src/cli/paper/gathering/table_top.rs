@@ -11,7 +11,9 @@ use glam::{DVec3, Vec2, Vec3};
 use std::f64::consts::PI;
 
 /// Pixels across and down of the reference from above.
-const SIZE: u32 = 56;
+const SIZE: u32 = 32;
+/// Paths for each of them.
+const PATHS: u32 = 512;
 /// Half of what it shows over half of the top.
 const MARGIN: f64 = 1.2;
 /// Height of its camera above the top, metres.
@@ -109,7 +111,7 @@ impl TopTruth {
     /// # Errors
     /// An interruption.
     pub fn new(top: &TableTop, max_depth: u32, hidden: bool, item: &str) -> Result<Self, Failure> {
-        let truth = Truth::new(&top.scene, [SIZE; 2], max_depth, hidden, item)?;
+        let truth = Truth::new(&top.scene, [SIZE; 2], max_depth, PATHS, hidden, item)?;
         let shown = top.half.max_element() * MARGIN as f32;
         Ok(Self { truth, pixel: shown / SIZE as f32, shown })
     }
@@ -145,8 +147,10 @@ impl TopTruth {
         (n > 0).then(|| (sum / f64::from(n), noise))
     }
 
-    /// Irradiance of the pixel at a place, W/m²; None off the image.
+    /// Irradiance of the pixel at a place, W/m², of those wholly on the top the nearest.
     pub fn at(&self, top: &TableTop, p: Vec2) -> Option<f64> {
+        let on = top.half - Vec2::splat(2.0 * self.pixel);
+        let p = p.clamp(-on, on);
         let index = |v: f32| ((v / self.shown + 1.0) / 2.0 * SIZE as f32).floor();
         let (x, y) = (index(p.x), index(p.y));
         let inside = (0.0..SIZE as f32).contains(&x) && (0.0..SIZE as f32).contains(&y);
@@ -169,7 +173,7 @@ mod tests {
         let intersector = Intersector::new(&top.scene.geometry, top.scene.radius);
         let rays = top.scene.camera.rays([SIZE; 2]);
         let shown = top.half.max_element() * MARGIN as f32;
-        for (x, y) in [(28, 28), (10, 28), (28, 50), (50, 45), (1, 28), (54, 54)] {
+        for (x, y) in [(16, 16), (5, 16), (16, 28), (27, 25), (1, 16), (30, 30)] {
             let (direction, _) = rays.ray(x as f32 + 0.5, y as f32 + 0.5, 0.5);
             let ray = Ray { origin: top.scene.camera.position, direction };
             let hit = intersector.closest(&ray).expect("a closed room");
