@@ -65,17 +65,17 @@ impl GlobalPhotons {
         &self.tree
     }
 
-    /// Power of the photons within `radius` of a place whose surfaces agree with its unit `normal`, and their number.
-    pub fn power_within(&self, position: Vec3, normal: Vec3, radius: f32) -> (DVec3, usize) {
-        let (mut sum, mut count) = (DVec3::ZERO, 0);
-        self.tree.within(position, radius, |i, _| {
+    /// Power of the photons from one distance (metres) of a place up to another whose surfaces agree with its unit
+    /// `normal`, W.
+    pub fn power_between(&self, position: Vec3, normal: Vec3, [from, to]: [f32; 2]) -> DVec3 {
+        let mut sum = DVec3::ZERO;
+        self.tree.within(position, to, |i, squared| {
             let p = &self.photons[i as usize];
-            if agree(p.normal, normal) {
+            if squared >= from * from && agree(p.normal, normal) {
                 sum += p.power.as_dvec3();
-                count += 1;
             }
         });
-        (sum, count)
+        sum
     }
 
     /// Irradiance at a place of a surface by its `k` nearest photons of surfaces that agree, over the disc that they fill,

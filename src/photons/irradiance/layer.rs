@@ -25,10 +25,12 @@ pub struct IrradianceEstimate {
 /// Where estimates are made and what they count for.
 #[derive(Clone, Copy)]
 pub enum Estimates<'a> {
-    /// Over the surface that the disc holds, without the photon at its own centre, weighted by area.
+    /// Over the surface that the disc holds, but for the photons and the surface nearer to its centre than estimates lie
+    /// to each other, and weighted by area.
     ///
-    /// An estimate lies where a photon is. That photon is there for certain, and would count as one more than arrive on
-    /// average; and where light is rare so are the places, so that their plain mean is that of the bright ones.
+    /// An estimate lies where a photon is, and where those before it are not. What lies near is there for certain, or is
+    /// not, and says nothing about how many arrive. Where light is rare so are the places, so that their plain mean would be
+    /// that of the bright ones.
     Corrected(&'a SurfaceAreas<'a>),
     /// Over the whole disc, with all photons, all of weight 1.
     AsPublished,
@@ -52,11 +54,14 @@ impl Layer {
             .par_iter()
             .map(|&i| {
                 let at = &all[i as usize];
-                let (power, _) = photons.power_within(at.position, at.normal, radius);
                 let (power, area) = match how {
-                    Estimates::AsPublished => (power, PI * f64::from(radius).powi(2)),
+                    Estimates::AsPublished => {
+                        (photons.power_between(at.position, at.normal, [0.0, radius]), PI * f64::from(radius).powi(2))
+                    }
                     Estimates::Corrected(areas) => {
-                        (power - at.power.as_dvec3(), areas.within(at.position, at.normal, radius))
+                        let area = |radius| areas.within(at.position, at.normal, radius);
+                        let power = photons.power_between(at.position, at.normal, [spacing, radius]);
+                        (power, area(radius) - area(spacing))
                     }
                 };
                 // A surface that is smaller than f32 can tell there holds no photons that count.
@@ -64,36 +69,7 @@ impl Layer {
                 IrradianceEstimate { position: at.position, normal: at.normal, irradiance, area: 1.0 }
             })
             .collect();
-        Self::new(radius, estimates, how)
-    }
-
-    /// A layer of larger `radius` from a finer one: the means of those estimates of `finer` whose discs lie wholly in the
-    /// new ones, at places that are no nearer to another of a related surface than `spacing`.
-    pub fn of_layer(finer: &Self, radius: f32, spacing: f32, how: Estimates) -> Self {
-        let all = &finer.estimates;
-        let kept = apart(&finer.tree, all.len(), spacing, |i| (all[i].position, all[i].normal));
-        let estimates = kept
-            .par_iter()
-            .map(|&i| {
-                let at = all[i as usize];
-                let mut mean = WeightedMean::default();
-                finer.tree.within(at.position, radius - finer.radius, |j, squared| {
-                    let other = &all[j as usize];
-                    let inside = squared.sqrt() < radius - finer.radius;
-                    if inside && agree(other.normal, at.normal) {
-                        mean.add(other);
-                    }
-                });
-                IrradianceEstimate { irradiance: mean.value().unwrap_or(at.irradiance), area: 1.0, ..at }
-            })
-            .collect();
-        Self::new(radius, estimates, how)
-    }
-
-    fn new(radius: f32, estimates: Vec<IrradianceEstimate>, how: Estimates) -> Self {
-        let tree = KdTree::new(estimates.iter().map(|e| e.position));
-        let estimates = tree.order().iter().map(|&i| estimates[i as usize]).collect();
-        let mut layer = Self { radius, estimates, tree: tree.renumbered() };
+        let mut layer = Self::new(radius, estimates);
         if let Estimates::Corrected(areas) = how {
             let shares: Vec<f32> = layer.estimates.par_iter().map(|e| layer.share(e, areas)).collect();
             layer.estimates.iter_mut().zip(shares).for_each(|(e, share)| e.area = share);
@@ -101,14 +77,80 @@ impl Layer {
         layer
     }
 
-    /// The surface that an estimate stands for, m²: that within the radius over the number of estimates there.
-    fn share(&self, e: &IrradianceEstimate, areas: &SurfaceAreas) -> f32 {
-        let mut count = 0u32;
-        self.tree.within(e.position, self.radius, |i, _| {
-            count += u32::from(agree(self.estimates[i as usize].normal, e.normal));
+    /// A layer of larger `radius` from a finer one, at places that are no nearer to another of a related surface than
+    /// `spacing`.
+    ///
+    /// As published each estimate is the mean of those of `finer` whose discs lie wholly in its own. Where the light changes
+    /// towards an edge that moves it inwards, and from layer to layer light is lost or won. Corrected it is the mean of
+    /// those that lie nearest to it: all layers have the same flux over the same area.
+    pub fn of_layer(finer: &Self, radius: f32, spacing: f32, how: Estimates) -> Self {
+        let all = &finer.estimates;
+        let kept = apart(&finer.tree, all.len(), spacing, |i| (all[i].position, all[i].normal));
+        let estimates = match how {
+            Estimates::AsPublished => kept.par_iter().map(|&i| finer.mean_inside(&all[i as usize], radius)).collect(),
+            Estimates::Corrected(_) => finer.cell_means(&kept),
+        };
+        Self::new(radius, estimates)
+    }
+
+    /// The estimate of that radius at the place of one of these, of those of which the whole disc lies inside.
+    fn mean_inside(&self, at: &IrradianceEstimate, radius: f32) -> IrradianceEstimate {
+        let mut mean = WeightedMean::default();
+        let reach = radius - self.radius;
+        self.tree.within(at.position, reach, |j, squared| {
+            let other = &self.estimates[j as usize];
+            if squared.sqrt() < reach && agree(other.normal, at.normal) {
+                mean.add(other);
+            }
         });
+        IrradianceEstimate { irradiance: mean.value().unwrap_or(at.irradiance), area: 1.0, ..*at }
+    }
+
+    /// For each of the `kept` estimates the mean and area of all that lie nearest to it on a related surface.
+    fn cell_means(&self, kept: &[u32]) -> Vec<IrradianceEstimate> {
+        let all = &self.estimates;
+        let of_kept = |i: u32| &all[kept[i as usize] as usize];
+        let tree = KdTree::new((0..kept.len() as u32).map(|i| of_kept(i).position));
+        let nearest = |e: &IrradianceEstimate| {
+            tree.nearest_one(e.position, f32::INFINITY, |i| agree(of_kept(i).normal, e.normal)).map(|(i, _)| i)
+        };
+        let cells: Vec<Option<u32>> = all.par_iter().map(nearest).collect();
+        let mut means = vec![WeightedMean::default(); kept.len()];
+        for (e, cell) in all.iter().zip(cells) {
+            // One that was not kept was marked by one on a related surface.
+            if let Some(cell) = cell {
+                means[cell as usize].add(e);
+            }
+        }
+        let cell = |(i, mean): (u32, &WeightedMean)| {
+            let at = of_kept(i);
+            let irradiance = mean.value().unwrap_or(at.irradiance);
+            IrradianceEstimate { irradiance, area: (mean.weight as f32).max(f32::MIN_POSITIVE), ..*at }
+        };
+        (0..).zip(&means).map(cell).collect()
+    }
+
+    fn new(radius: f32, estimates: Vec<IrradianceEstimate>) -> Self {
+        let tree = KdTree::new(estimates.iter().map(|e| e.position));
+        let estimates = tree.order().iter().map(|&i| estimates[i as usize]).collect();
+        Self { radius, estimates, tree: tree.renumbered() }
+    }
+
+    /// The surface that an estimate stands for, m²: what a ball holds of it, over the number of estimates there.
+    fn share(&self, e: &IrradianceEstimate, areas: &SurfaceAreas) -> f32 {
+        let (mut radius, mut count) = (self.radius, 0u32);
+        for _ in 0..6 {
+            count = 0;
+            self.tree.within(e.position, radius, |i, _| {
+                count += u32::from(agree(self.estimates[i as usize].normal, e.normal));
+            });
+            if count >= ENOUGH {
+                break;
+            }
+            radius *= 2.0;
+        }
         // It finds itself at least. One whose surface f32 cannot tell from none still has a weight.
-        let area = areas.within(e.position, e.normal, self.radius) / f64::from(count.max(1));
+        let area = areas.within(e.position, e.normal, radius) / f64::from(count.max(1));
         (area as f32).max(f32::MIN_POSITIVE)
     }
 
@@ -144,6 +186,9 @@ impl Layer {
         });
     }
 }
+
+/// Estimates that a ball has to hold for their number to tell how densely they lie.
+const ENOUGH: u32 = 8;
 
 /// Memory of an estimate in a layer, bytes.
 pub const BYTES_PER_ESTIMATE: usize = size_of::<IrradianceEstimate>() + BYTES_PER_ENTRY;
