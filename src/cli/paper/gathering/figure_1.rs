@@ -106,7 +106,7 @@ impl<'a> Found<'a> {
 
     fn estimates(&'a self, p: Vec2) -> [f64; 4] {
         let at = self.top.place(p);
-        let (power, _) = self.photons.power_within(at, Vec3::Y, RADIUS);
+        let power = self.photons.power_between(at, Vec3::Y, [0.0, RADIUS]);
         let over = |area: f64| if area > 0.0 { mean_of(power) / area } else { 0.0 };
         let of_layer = |layer: &'a Layer| {
             let mut sum = WeightedMean::default();
