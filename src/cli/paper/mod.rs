@@ -41,7 +41,7 @@ pub struct PaperArgs {
 /// The common flags that mean something here: they override the settings of an item.
 #[derive(Clone, Debug, Default, Args)]
 pub struct PaperFlags {
-    /// Size of the image in pixels; if left out 512x512 for the thesis, 64x64 for gather-table, 128x128 for its figures 4 and 5
+    /// Size of the image in pixels; if left out 512x512 for the thesis, 64x64 for gather-table, 96x96 for its figures 4 and 5
     #[arg(long, value_name = "WxH", value_parser = size)]
     size: Option<[u32; 2]>,
     /// Photons emitted; if left out 446300 for the thesis, which store the published 4978 caustic ones, 1e6 for gather-table

@@ -68,7 +68,8 @@ struct Report<'a> {
     reference: &'a str,
     truth: f64,
     truth_noise: f64,
-    truth_at_the_point: Option<f64>,
+    /// Within `inset_m` of the place.
+    truth_near: Option<f64>,
     rows: &'a [Row],
 }
 
@@ -200,7 +201,7 @@ pub fn run(item: &'static str, flags: &PaperFlags, folder: &Path) -> Result<Done
         reference: truth.source(),
         truth: value,
         truth_noise: noise,
-        truth_at_the_point: truth.at(&top, drawn),
+        truth_near: truth.mean(&top, drawn, INSET).map(|(near, _)| near),
         rows: &rows,
     };
     let mut table = Table::new(["estimate of irradiance", "W/m²", "over the truth", "mean over the edges", "rms"]);

@@ -4,7 +4,7 @@ use crate::cli::failure::Failure;
 use crate::cli::paper::PaperFlags;
 use crate::cli::paper::gathering::methods::Way;
 use crate::cli::paper::gathering::output::{Head, counts};
-use crate::cli::paper::gathering::reference::{PATHS, Truth, TruthFacts};
+use crate::cli::paper::gathering::reference::{Truth, TruthFacts};
 use crate::cli::paper::gathering::room::{settings, two_lights};
 use crate::cli::paper::output::Done;
 use crate::cli::progress::{ProgressWatch, bar, interrupted};
@@ -28,7 +28,9 @@ const PHOTONS: i64 = 500_000;
 /// Radius of the first search and of the first layer, metres.
 const RADIUS: f32 = 0.05;
 /// Pixels across and down by default.
-const SIZE: [u32; 2] = [128, 128];
+const SIZE: [u32; 2] = [96, 96];
+/// Paths for each pixel of the reference at most.
+const PATHS: u32 = 2048;
 /// The part that is enlarged: x, y, width and height over the image's.
 const CROP: [f64; 4] = [0.22, 0.44, 0.625, 0.44];
 /// Width of an enlarged part, about, pixels.

@@ -13,8 +13,6 @@ use serde::Serialize;
 
 /// Noise over the mean at which a reference is good enough.
 const NOISE: f64 = 0.01;
-/// Paths for each pixel of an image of the room at most.
-pub const PATHS: u32 = 4096;
 /// Seed of the references, which no study uses: their batches are then those of these items alone.
 const SEED: u64 = 3;
 /// Rays across a pixel that look for edges.

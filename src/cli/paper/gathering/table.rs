@@ -9,7 +9,7 @@ use crate::cli::paper::gathering::measured::measure;
 use crate::cli::paper::gathering::methods::Way;
 use crate::cli::paper::gathering::output::Head;
 use crate::cli::paper::gathering::printed::{PRINTED, TABLES};
-use crate::cli::paper::gathering::reference::{PATHS, Truth, TruthFacts};
+use crate::cli::paper::gathering::reference::{Truth, TruthFacts};
 use crate::cli::paper::gathering::room::{one_large_light, settings};
 use crate::cli::paper::gathering::rows::{Section, csv, memory_text, summary, text};
 use crate::cli::paper::output::Done;
@@ -22,6 +22,8 @@ use std::path::Path;
 
 /// Pixels across and down by default: all nine cells by three ways then take a few minutes on two cores.
 const SIZE: [u32; 2] = [64, 64];
+/// Paths for each pixel of the reference at most.
+const PATHS: u32 = 4096;
 
 #[derive(Serialize)]
 struct Report<'a> {
