@@ -4,15 +4,17 @@
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use cusp::estimate::polygon::{integral_over_polygon, mean_over_parallelogram};
-use cusp::estimate::registry::estimator;
+use cusp::estimate::registry::{estimator, estimators};
 use cusp::estimate::{Estimator, Gathered, View};
 use cusp::math::angle::angle;
 use cusp::math::sequence::{Sampling, Sequence};
+use cusp::photons::irradiance::{GlobalPhotons, IrradiancePyramid, PyramidSettings};
 use cusp::photons::kd_tree::Nearest;
 use cusp::photons::map::{FootprintLimits, MapParts, Query};
-use cusp::photons::{Photon, PhotonMap};
+use cusp::photons::{Photon, PhotonKind, PhotonMap};
 use cusp::render::Silent;
 use cusp::render::film::{Film, Rect};
+use cusp::render::plan::Slot;
 use cusp::render::{RenderSettings, Renderer};
 use cusp::scene::open;
 use cusp::scene::scene_file::RenderFile;
@@ -210,5 +212,43 @@ fn film(c: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, gather_and_estimate, polygon, tracing, film);
+/// 64 points with 200 gather rays each, by what is looked up at their ends, and what the look-ups are built in.
+fn final_gathering(c: &mut Criterion) {
+    let scene = open("two_lights").expect("built in");
+    let flags = RenderFile { photons: Some(200_000), ..Default::default() };
+    let settings = RenderSettings::new(&scene, &flags, Some([8, 8]), 1).expect("valid");
+    let list = "integrated+classic:rays=200,integrated+precomputed:rays=200,integrated+ray-differentials:rays=200";
+    let mut renderer = Renderer::new(scene.into(), settings, estimators(list).expect("registered"));
+    renderer.step(&Silent);
+    let pass = renderer.last_pass().expect("one pass");
+    let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a pool");
+    let mut group = c.benchmark_group("final_gathering");
+    group.sample_size(10);
+    for (name, estimator) in
+        ["classic (baseline)", "precomputed", "ray_differentials"].iter().zip(renderer.estimators())
+    {
+        let slot = Slot::new(estimator.as_ref(), pass.settings.gather);
+        group.bench_function(format!("64_points_200_rays/{name}"), |b| {
+            b.iter(|| one.install(|| pass.view().run(Rect::whole([8, 8]), &[slot], &Silent).wall));
+        });
+    }
+    let photons = &pass.photons.stored;
+    group.bench_function("build/tree_over_photons (baseline)", |b| {
+        b.iter(|| GlobalPhotons::new(photons, &PhotonKind::ALL).photons().len());
+    });
+    for (name, as_published) in [("pyramid", false), ("pyramid_as_published", true)] {
+        let tree = GlobalPhotons::new(photons, &PhotonKind::ALL);
+        let settings = PyramidSettings { radius: 0.08, growth: 2.0, as_published, layers: usize::MAX };
+        group.bench_function(format!("build/{name}"), |b| {
+            b.iter(|| {
+                let mut pyramid = IrradiancePyramid::new(&pass.scene, &tree, &settings);
+                pyramid.grow(&pass.scene, &settings);
+                pyramid.layers().len()
+            });
+        });
+    }
+    group.finish();
+}
+
+criterion_group!(benches, gather_and_estimate, polygon, tracing, film, final_gathering);
 criterion_main!(benches);

@@ -3,8 +3,9 @@
 //! Sizes are those of the values; where lists grow by doubling, or a step holds a copy, both count. What cannot be
 //! foreseen is left out: photons that one view hit gathers, four bytes each for every thread.
 
-use crate::photons::Photon;
+use crate::photons::irradiance::{global_photons, layer};
 use crate::photons::map::{MapParts, PREPARED_BYTES, map_bytes};
+use crate::photons::{Photon, kd_tree};
 use crate::render::error_estimate;
 use crate::render::plan::{Pilot, Plan};
 use crate::render::settings::{RenderSettings, SettingError};
@@ -33,8 +34,15 @@ impl MemoryNeed {
         self.images.saturating_add(self.photons).saturating_add(self.maps)
     }
 
-    /// That of a render of `estimators` images, of which each pass stores so many photons.
-    pub fn new(settings: &RenderSettings, estimators: usize, photons_stored: u64, parts: MapParts) -> Self {
+    /// That of a render of `estimators` images, of which each pass stores so many photons in maps with those `parts`, and
+    /// again in the structures of final gathering if it `gathers`.
+    pub fn new(
+        settings: &RenderSettings,
+        estimators: usize,
+        photons_stored: u64,
+        parts: MapParts,
+        gathers: bool,
+    ) -> Self {
         // While they are traced they are in the parts of the threads and in the whole.
         let traced = 2 * size_of::<Photon>();
         let held = size_of::<Photon>();
@@ -42,7 +50,10 @@ impl MemoryNeed {
             images: image_bytes(settings.size, estimators),
             photons_stored,
             photons: bytes(photons_stored, traced + held),
-            maps: bytes(photons_stored, PREPARED_BYTES + 2 * map_bytes(parts)),
+            maps: bytes(
+                photons_stored,
+                PREPARED_BYTES + 2 * map_bytes(parts) + if gathers { gather_bytes() } else { 0 },
+            ),
         }
     }
 
@@ -63,6 +74,13 @@ impl MemoryNeed {
         };
         check(asked, needed, advice)
     }
+}
+
+/// Bytes of a stored photon in what final gathering looks up, at its highest: the photon with its tree, what building that
+/// takes, and an estimate in the first layer and half of one in all others, of this pass and of the one before.
+fn gather_bytes() -> usize {
+    let photons = global_photons::bytes(1) + kd_tree::BYTES_PER_BUILT_ENTRY;
+    photons + 2 * (layer::BYTES_PER_ESTIMATE + layer::BYTES_PER_ESTIMATE / 2)
 }
 
 const IMAGE_ADVICE: &str = "lower the size (--size, size, camera.resolution) or take fewer estimators";
@@ -100,7 +118,7 @@ pub fn foreseen(
     pilot: Option<&Pilot>,
     estimators: usize,
 ) -> MemoryNeed {
-    let need = |stored| MemoryNeed::new(settings, estimators, stored, plan.map_parts());
+    let need = |stored| MemoryNeed::new(settings, estimators, stored, plan.map_parts(), plan.gathers());
     let most = need(most_stored(settings, plan));
     let likely = |pilot: &Pilot| need(likely_stored(settings, plan, pilot).min(most.photons_stored));
     match pilot {
@@ -164,7 +182,7 @@ mod tests {
         assert!(why.starts_with("size: 100000 images of 8192x8192 pixels would need ") && !why.contains('\n'), "{why}");
         // Numbers beyond 64 bits saturate.
         settings.photons = u64::MAX;
-        let need = MemoryNeed::new(&settings, usize::MAX, u64::MAX, MapParts { kd_tree: true, overlap: true });
+        let need = MemoryNeed::new(&settings, usize::MAX, u64::MAX, MapParts { kd_tree: true, overlap: true }, true);
         assert_eq!(need.total(), u64::MAX);
     }
 }

@@ -1,6 +1,6 @@
 //! The progressive renderer: a value that makes one pass at each step.
 
-use crate::estimate::{Estimator, Lookup};
+use crate::estimate::{Estimator, FinalGathering, Lookup};
 use crate::final_gather::GatherCounts;
 use crate::render::change::{PhotonStore, World, film_is_kept, photons_are_kept};
 use crate::render::error_estimate::ErrorEstimate;
@@ -545,6 +545,21 @@ impl Renderer {
         }
         if self.inside_glass > 0 {
             all.push(format!("the camera stands inside glass: {} view rays start there", self.inside_glass));
+        }
+        let gathers = &self.gather_counts;
+        if gathers.unknown > 0 {
+            let part = 100.0 * gathers.unknown as f64 / gathers.rays.max(1) as f64;
+            all.push(format!(
+                "{} gather rays ({part:.2} %) end where no photon has arrived and brought no light; emit more photons",
+                gathers.unknown
+            ));
+        }
+        let below = |f: &&FinalGathering| f.radius.is_some_and(|r| r < self.scene.resolution());
+        if let Some(f) = self.plan.final_gatherings.iter().find(below) {
+            all.push(format!(
+                "{f}: its radius is below the resolution of 32 bits in this scene and was raised to {:e} m",
+                self.scene.resolution()
+            ));
         }
         all
     }

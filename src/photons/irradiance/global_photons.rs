@@ -69,9 +69,9 @@ impl GlobalPhotons {
     /// `normal`, W.
     pub fn power_between(&self, position: Vec3, normal: Vec3, [from, to]: [f32; 2]) -> DVec3 {
         let mut sum = DVec3::ZERO;
-        self.tree.within(position, to, |i, squared| {
+        self.tree.within(position, to, |i, offset| {
             let p = &self.photons[i as usize];
-            if squared >= from * from && agree(p.normal, normal) {
+            if offset.length_squared() >= from * from && agree(p.normal, normal) {
                 sum += p.power.as_dvec3();
             }
         });

@@ -97,9 +97,9 @@ impl Layer {
     fn mean_inside(&self, at: &IrradianceEstimate, radius: f32) -> IrradianceEstimate {
         let mut mean = WeightedMean::default();
         let reach = radius - self.radius;
-        self.tree.within(at.position, reach, |j, squared| {
+        self.tree.within(at.position, reach, |j, offset| {
             let other = &self.estimates[j as usize];
-            if squared.sqrt() < reach && agree(other.normal, at.normal) {
+            if offset.length() < reach && agree(other.normal, at.normal) {
                 mean.add(other);
             }
         });
@@ -178,10 +178,9 @@ impl Layer {
     /// it, and which is no farther from its centre than the longest semi-axis.
     #[inline]
     pub fn in_ellipse(&self, ellipse: &Ellipse, mut visit: impl FnMut(u32, &IrradianceEstimate)) {
-        self.tree.within(ellipse.center, ellipse.transform.reach, |i, _| {
-            let e = &self.estimates[i as usize];
-            if ellipse.holds(e.position) {
-                visit(i, e);
+        self.tree.within(ellipse.center, ellipse.transform.reach, |i, offset| {
+            if ellipse.holds(offset) {
+                visit(i, &self.estimates[i as usize]);
             }
         });
     }
@@ -214,11 +213,10 @@ impl Ellipse {
         self.transform.reach
     }
 
-    /// Whether a place projected along the normal lies inside.
+    /// Whether a place at that offset from the centre lies inside when it is projected along the normal.
     #[inline]
-    pub fn holds(&self, position: Vec3) -> bool {
-        let to = position - self.center;
-        let (x, y) = (self.transform.rows[0].dot(to), self.transform.rows[1].dot(to));
+    pub fn holds(&self, offset: Vec3) -> bool {
+        let (x, y) = (self.transform.rows[0].dot(offset), self.transform.rows[1].dot(offset));
         x * x + y * y <= 1.0
     }
 }

@@ -25,6 +25,12 @@ pub const PHOTON_SPACING: f32 = 0.25;
 /// Estimates nearer to one of the next layer than this part of their own radius get none there.
 pub const ESTIMATE_SPACING: f32 = 0.75;
 
+/// Radius of the layer that is looked up over the longest semi-axis of the footprint, as published.
+const SHARE_AS_PUBLISHED: f32 = 0.5;
+/// The same where estimates are means over cells, which are smaller than their discs: with half of it there is as much
+/// noise, and four times as many estimates are read.
+const SHARE: f32 = 1.0;
+
 /// Memory while a pyramid was made, bytes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct PyramidMemory {
@@ -51,6 +57,8 @@ pub struct IrradiancePyramid {
     layers: Vec<Layer>,
     memory: PyramidMemory,
     seconds: PyramidSeconds,
+    /// Radius of the layer for a footprint, over its longest semi-axis.
+    share: f32,
 }
 
 impl IrradiancePyramid {
@@ -64,7 +72,8 @@ impl IrradiancePyramid {
         let memory =
             PyramidMemory { photons: photons.bytes() as u64, peak: photons.bytes() as u64 + bytes, layers: bytes };
         let seconds = PyramidSeconds { first: start.elapsed().as_secs_f64(), others: 0.0 };
-        Self { layers: vec![first], memory, seconds }
+        let share = if settings.as_published { SHARE_AS_PUBLISHED } else { SHARE };
+        Self { layers: vec![first], memory, seconds, share }
     }
 
     /// Makes the other layers, until one disc would hold half the scene, a layer is a single estimate, or there are as many
@@ -101,7 +110,8 @@ impl IrradiancePyramid {
         &self.seconds
     }
 
-    /// Index of the layer whose radius is nearest in ratio to half of a footprint's longest semi-axis (metres); None if
+    /// Index of the layer whose radius is nearest in ratio to a footprint's longest semi-axis (metres), or as published to
+    /// half of it; None if
     /// that semi-axis is shorter than the first layer's radius, so that the nearest estimate takes its place.
     pub fn layer_for(&self, longest: f32) -> Option<usize> {
         let position = self.position_for(longest)?;
@@ -118,7 +128,7 @@ impl IrradiancePyramid {
         let Some(second) = self.layers.get(1) else { return Some(0.0) };
         let growth = libm::log2f(second.radius() / first);
         let last = (self.layers.len() - 1) as f32;
-        Some((libm::log2f(longest / 2.0 / first) / growth).clamp(0.0, last))
+        Some((libm::log2f(longest * self.share / first) / growth).clamp(0.0, last))
     }
 }
 

@@ -61,22 +61,11 @@ fn apart(places: &[(Vec3, Vec3)], spacing: f32) -> Vec<usize> {
     kept
 }
 
-/// The estimates of a layer in an order of their own, to be compared.
-fn sorted(layer: &Layer) -> Vec<IrradianceEstimate> {
-    let mut all = layer.estimates().to_vec();
-    all.sort_by_key(|e| (e.position.to_array(), e.normal.to_array()).map_bits());
+/// Estimates in an order that does not depend on how they were found.
+fn sorted(estimates: &[IrradianceEstimate]) -> Vec<IrradianceEstimate> {
+    let mut all = estimates.to_vec();
+    all.sort_by_key(|e| (e.position.to_array().map(f32::to_bits), e.normal.to_array().map(f32::to_bits)));
     all
-}
-
-trait Bits {
-    fn map_bits(self) -> [u32; 6];
-}
-
-impl Bits for ([f32; 3], [f32; 3]) {
-    fn map_bits(self) -> [u32; 6] {
-        let ([a, b, c], [d, e, f]) = self;
-        [a, b, c, d, e, f].map(f32::to_bits)
-    }
 }
 
 /// Every layer as published, estimate by estimate, against double loops in f64.
@@ -130,9 +119,7 @@ fn layers_are_those_of_brute_force() {
 }
 
 fn compare(expected: &[IrradianceEstimate], layer: &Layer, which: &str) {
-    let mut expected = expected.to_vec();
-    expected.sort_by_key(|e| (e.position.to_array(), e.normal.to_array()).map_bits());
-    let got = sorted(layer);
+    let (expected, got) = (sorted(expected), sorted(layer.estimates()));
     assert_eq!(expected.len(), got.len(), "{which}");
     for (e, g) in expected.iter().zip(&got) {
         assert_eq!((e.position, e.normal), (g.position, g.normal), "{which}");
@@ -247,17 +234,22 @@ fn odd_rooms_have_a_pyramid() {
     }
 }
 
-/// The layer whose radius is nearest to half the footprint, and none below the first.
+/// The layer whose radius is nearest to the footprint, as published to half of it, and none below the first.
 #[test]
 fn footprints_find_their_layer() {
     let scene = open("two_lights").expect("built in");
     let photons = GlobalPhotons::new(&traced(&scene, 20_000), &PhotonKind::ALL);
-    let made = pyramid(&scene, &photons, &settings(0.05, false));
-    let last = made.layers().len() - 1;
-    let cases = [(0.04, None), (0.05, Some(0)), (0.1, Some(0)), (0.13, Some(0)), (0.15, Some(1)), (0.2, Some(1))];
-    for (longest, layer) in cases.into_iter().chain([(0.4, Some(2)), (1e9, Some(last)), (f32::NAN, None)]) {
-        assert_eq!(made.layer_for(longest), layer, "{longest}");
+    for (as_published, half) in [(true, 1.0), (false, 0.5)] {
+        let made = pyramid(&scene, &photons, &settings(0.05, as_published));
+        let last = made.layers().len() - 1;
+        let cases =
+            [(0.10, Some(0)), (0.13, Some(0)), (0.15, Some(1)), (0.2, Some(1)), (0.4, Some(2)), (1e9, Some(last))];
+        for (longest, layer) in cases {
+            assert_eq!(made.layer_for(longest * half), layer, "{longest} {as_published}");
+        }
+        assert_eq!(made.layer_for(0.049), None);
+        assert_eq!(made.layer_for(f32::NAN), None);
+        assert_eq!(made.position_for(0.1 * half), Some(0.0));
+        assert!((made.position_for(0.1 * half * 2f32.sqrt()).expect("one") - 0.5).abs() < 1e-5);
     }
-    assert_eq!(made.position_for(0.1), Some(0.0));
-    assert!((made.position_for(0.1 * 2f32.sqrt()).expect("one") - 0.5).abs() < 1e-5);
 }
