@@ -54,7 +54,7 @@ fn wrong_calls_are_refused_in_one_line() {
         (vec!["compare", "ring", "--footprint-scale", "nan", "--out", o], "--footprint-scale"),
         (vec!["compare", "ring", "--gather", "octree", "--out", o], "one of knn, overlap"),
         (vec!["compare", "ring", "--light", "dark", "--out", o], "one of all, direct"),
-        (vec!["compare", "ring", "--final-gather", "classic", "--out", o], "one of none"),
+        (vec!["compare", "ring", "--final-gather", "some", "--out", o], "there are none, classic"),
         (vec!["compare", "ring", "--estimators", "sharp", "--out", o], "there are density"),
         (vec!["compare", "ring", "--estimators", "multi_sampled:m=3", "--out", o], "it takes n, grid"),
         (vec!["compare", "ring", "--crop", "500,0,100,10", "--out", o], "leaves the image"),
@@ -458,6 +458,7 @@ fn shot_draws_the_window() {
     refused(&["shot", "-o", o, "--overlays", "ghost"], 2, "there are footprint");
     refused(&["shot", "-o", o, "--pixel", "999,1"], 2, "--pixel: lies outside");
     refused(&["shot", "-o", o, "--maximize", "5"], 2, "numbered 1 to 4");
+    refused(&["shot", "-o", o, "--maximize", "2", "--final-gather", "classic"], 2, "numbered 1 to 1");
     refused(&["shot", "-o", o, "nowhere"], 2, "built in: ring");
     assert!(!out.exists());
 }

@@ -157,7 +157,7 @@ fn files_hold_what_the_window_shows() {
         let field = |key: &str| &line[lines[0].iter().position(|k| k == key).expect(key)];
         assert_eq!((field("estimator").as_str(), field("passes").as_str()), (name, "1"));
         let number = |key: &str| field(key).parse::<f64>().expect(key);
-        let parts = ["photons_and_maps_s", "view_trace_s", "gather_s", "estimate_s"].map(number);
+        let parts = ["photons_and_maps_s", "view_trace_s", "gather_s", "estimate_s", "final_gather_s"].map(number);
         assert!((parts.iter().sum::<f64>() - number("total_s")).abs() < 1e-5 && number("total_s") > 0.0, "{csv}");
         let image = read(&out.join(format!("{name}.exr")));
         let error = Reference::from_files(&reference, None).expect("reads").error_of(&image).expect("sizes fit");

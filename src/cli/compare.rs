@@ -10,11 +10,12 @@ use crate::cli::{print, to_json};
 use crate::estimate::Lookup;
 use crate::estimate::registry::{self, ESTIMATORS};
 use crate::estimate::regular::Regular;
-use crate::export::report::{CompareReport, EstimatorReport, EstimatorSeconds, PlanCost, RenderReport};
+use crate::export::report::{CompareReport, EstimatorReport, EstimatorSeconds, PlanCost, RenderReport, final_gather};
 use crate::export::session::Session;
 use crate::export::sheet::{self, Column, PALETTE, Sheet};
 use crate::export::tone::{Look, ToneMap, auto_exposure, to_srgb};
 use crate::export::{Provenance, exr_file, names, png_file, whole_file};
+use crate::final_gather::GatherMaps;
 use crate::measure::Reference;
 use crate::measure::metrics::{Mask, compare};
 use crate::measure::truth::{TRUTH_RAYS, truth};
@@ -149,7 +150,9 @@ impl<'a> Comparison<'a> {
             (None, None) if settings.final_gather != "none" => vec![registry::estimator(&settings.estimator)?],
             (None, None) => ESTIMATORS.iter().filter_map(|e| e.default_estimator()).collect(),
         };
-        let estimators = settings.with_final_gathering(&estimators)?;
+        // Panels say themselves how they gather finally, unless flag or session ask for it on top.
+        let own = of_session && session.render.final_gather.is_none();
+        let estimators = if own { estimators } else { settings.with_final_gathering(&estimators)? };
         if estimators.is_empty() {
             return Err(Failure::Call(format!("{}: no panel has an estimator; give --estimators", args.scene)));
         }
@@ -313,6 +316,7 @@ impl<'a> Comparison<'a> {
                 Default::default()
             };
             let maps = PhotonMaps::new(r.scene(), plan, &photons.stored, settings.footprint_scale);
+            GatherMaps::new(r.scene(), &photons.stored, &plan.final_gatherings, settings.k, 1.0);
             let stored: usize = maps.all().map(|m| m.photons().len()).sum();
             (start.elapsed().as_secs_f64(), stored as u64)
         };
@@ -337,6 +341,8 @@ impl<'a> Comparison<'a> {
             EstimatorReport {
                 id: e.id().into(),
                 settings: e.settings(),
+                final_gathering: e.final_gathering().map(ToString::to_string),
+                final_gather: final_gather(r, i),
                 seconds: EstimatorSeconds { parts, view_pass: parts.total() },
                 ratio_to_regular: regular.filter(|&s| s > 0.0).map(|s| parts.total() / s),
                 photons_per_pixel: r.gathered()[i] as f64 / (f64::from(w) * f64::from(h)),
@@ -404,7 +410,7 @@ impl<'a> Comparison<'a> {
     ) -> Sheet {
         let r = &report.render;
         let columns = report.estimators.iter().zip(images).enumerate().map(|(i, (e, image))| Column {
-            title: if e.settings.is_empty() { e.id.clone() } else { format!("{}:{}", e.id, e.settings) },
+            title: e.name(),
             lines: vec![
                 format!(
                     "{:.3} s{}",

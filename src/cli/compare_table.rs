@@ -11,30 +11,27 @@ pub fn text(report: &CompareReport, folder: &Path) -> String {
     let r = &report.render;
     let stored = &r.photons_stored;
     let seconds = |s: f64| format!("{s:.3}");
-    let mut table = Table::new([
-        "estimator",
-        "view pass s",
-        "view rays s",
-        "gather s",
-        "estimate s",
-        "x regular",
-        "photons/pixel",
-        "error",
-        "to reference",
-    ]);
+    let gathers = report.estimators.iter().any(|e| e.seconds.parts.final_gather > 0.0);
+    let mut heading = vec!["estimator", "view pass s", "view rays s", "gather s", "estimate s"];
+    heading.extend(gathers.then_some("final gathering s"));
+    heading.extend(["x regular", "photons/pixel", "error", "to reference"]);
+    let mut table = Table::new(heading);
     for e in &report.estimators {
-        let name = if e.settings.is_empty() { e.id.clone() } else { format!("{}:{}", e.id, e.settings) };
-        table.row([
-            name,
+        let mut cells = vec![
+            e.name(),
             seconds(e.seconds.view_pass),
             seconds(e.seconds.parts.view_trace),
             seconds(e.seconds.parts.gather),
             seconds(e.seconds.parts.estimate),
+        ];
+        cells.extend(gathers.then(|| seconds(e.seconds.parts.final_gather)));
+        cells.extend([
             e.ratio_to_regular.map_or("-".into(), |x| format!("{x:.2}")),
             format!("{:.1}", e.photons_per_pixel),
             percent(e.error.map(|e| e.relative_rmse)),
             percent(e.reference_error.map(|e| e.relative_rmse)),
         ]);
+        table.row(cells);
     }
     let c = report.crop;
     let mut out = format!(
@@ -87,6 +84,13 @@ pub fn text(report: &CompareReport, folder: &Path) -> String {
             r.seconds.plan, cost.needed_seconds, cost.needed_stored, cost.full_seconds, cost.full_stored,
             if cost.needed_stored > 0 { cost.full_seconds / cost.needed_seconds } else { 1.0 }
         ));
+    }
+    let gathered: Vec<_> = report.estimators.iter().filter_map(|e| e.final_gather.as_ref()).collect();
+    if !gathered.is_empty() {
+        out.push_str(&format!("\nfinal gathering: {}\n", r.gather_counts.line()));
+        let mut lines: Vec<String> = gathered.iter().map(|f| f.line()).collect();
+        lines.dedup();
+        lines.iter().for_each(|line| out.push_str(&format!("  {line}\n")));
     }
     let bounded = r.bounded.lines();
     if !bounded.is_empty() {

@@ -1,14 +1,19 @@
 //! An inspection as JSON: the content of `inspect --json`.
 
 use crate::export::Provenance;
+use crate::final_gather::{GatherCounts, RecordedRay};
+use crate::math::rgb::Rgb;
 use crate::photons::PhotonKind;
-use crate::render::inspect::{Inspection, PathVertex, PhotonRow, Situation, SurfaceKind};
+use crate::photons::irradiance::PyramidMemory;
+use crate::render::inspect::gathering::layer_of;
+use crate::render::inspect::{Gathering, Inspection, PathVertex, PhotonRow, RayEnd, Situation, SurfaceKind};
 use crate::render::pass::Pass;
 use crate::render::settings::RenderSettings;
 use crate::render::stats::StoredCounts;
 use crate::render::{Gather, LightPart, Plan};
 use glam::Vec3;
 use serde::Serialize;
+use std::collections::BTreeMap;
 
 /// Everything that made one pixel. Positions are in metres, in the coordinates of the scene file.
 #[derive(Debug, Serialize)]
@@ -31,6 +36,7 @@ pub struct InspectionReport {
     path: Vec<Vertex>,
     hits: Vec<Hit>,
     photons: Vec<Photon>,
+    final_gathering: Vec<Gathered>,
     warnings: Vec<String>,
     settings: RenderSettings,
     plan: Plan,
@@ -101,6 +107,64 @@ struct Photon {
     samples: Vec<u32>,
 }
 
+/// Final gathering under one estimator.
+#[derive(Debug, Serialize)]
+struct Gathered {
+    estimator: usize,
+    settings: String,
+    radius: f32,
+    layers: Vec<Layer>,
+    memory: Option<PyramidMemory>,
+    counts: GatherCounts,
+    ends: BTreeMap<RayEnd, usize>,
+    rays_left_out: u64,
+    hits: Vec<GatheredAt>,
+}
+
+#[derive(Debug, Serialize)]
+struct Layer {
+    radius: f32,
+    estimates: usize,
+    bytes: usize,
+    /// Rays that took their irradiance from it.
+    rays: usize,
+}
+
+#[derive(Debug, Serialize)]
+struct GatheredAt {
+    hit: usize,
+    irradiance: [f32; 3],
+    contribution: [f32; 3],
+    rays: Vec<Ray>,
+}
+
+#[derive(Debug, Serialize)]
+struct Ray {
+    direction: [f32; 3],
+    /// Half-axis of its disc of directions.
+    radius: f32,
+    end: RayEnd,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    hit: Option<RayHit>,
+    layer: Option<usize>,
+    /// Layer and index of the estimates that count.
+    estimates: Vec<(usize, u32)>,
+    irradiance: [f32; 3],
+    /// What it adds to the irradiance of the hit.
+    contribution: [f32; 3],
+    /// What it adds to the pixel.
+    pixel: [f32; 3],
+}
+
+#[derive(Debug, Serialize)]
+struct RayHit {
+    position: [f64; 3],
+    normal: [f32; 3],
+    distance: f32,
+    specular: u32,
+    footprint: [[f32; 3]; 2],
+}
+
 impl InspectionReport {
     /// Of a pixel of a pass, with what was odd.
     pub fn new(pass: &Pass, found: &Inspection, warnings: Vec<String>) -> Self {
@@ -138,6 +202,7 @@ impl InspectionReport {
             path: found.path.iter().map(|v| vertex(pass, v)).collect(),
             hits: hits.collect(),
             photons: found.rows.iter().map(|r| photon(pass, r)).collect(),
+            final_gathering: found.gatherings.iter().map(|g| gathered(pass, g)).collect(),
             warnings,
             settings: pass.settings.clone(),
             plan: pass.plan.clone(),
@@ -190,5 +255,48 @@ fn photon(pass: &Pass, r: &PhotonRow) -> Photon {
         weights: r.weights.clone(),
         contributions: r.contributions.iter().map(|c| c.to_array()).collect(),
         samples: r.samples.clone(),
+    }
+}
+
+fn gathered(pass: &Pass, g: &Gathering) -> Gathered {
+    let layers = g.layers.iter().zip(g.rays_by_layer());
+    let hits = g.hits.iter().map(|h| GatheredAt {
+        hit: h.hit,
+        irradiance: h.irradiance.to_array(),
+        contribution: h.contribution.to_array(),
+        rays: h.rays.iter().map(|r| ray(pass, r, h.weight)).collect(),
+    });
+    Gathered {
+        estimator: g.estimator,
+        settings: g.settings.to_string(),
+        radius: g.radius,
+        layers: layers
+            .map(|(l, rays)| Layer { radius: l.radius, estimates: l.estimates, bytes: l.bytes, rays })
+            .collect(),
+        memory: g.memory,
+        counts: g.counts,
+        ends: g.ends(),
+        rays_left_out: g.unrecorded,
+        hits: hits.collect(),
+    }
+}
+
+fn ray(pass: &Pass, r: &RecordedRay, weight: Rgb) -> Ray {
+    Ray {
+        direction: r.direction.to_array(),
+        radius: r.radius,
+        end: RayEnd::of(r),
+        hit: r.hit.map(|h| RayHit {
+            position: place(pass, h.position),
+            normal: h.normal.to_array(),
+            distance: h.distance,
+            specular: h.specular,
+            footprint: axes(h.footprint),
+        }),
+        layer: layer_of(r),
+        estimates: r.estimates.clone(),
+        irradiance: r.irradiance.to_array(),
+        contribution: r.contribution.to_array(),
+        pixel: (r.contribution * weight).to_array(),
     }
 }

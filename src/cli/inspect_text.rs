@@ -1,6 +1,8 @@
 //! What `inspect` prints for people.
 
+use crate::cli::inspect_rays;
 use crate::cli::table::Table;
+use crate::estimate::registry::short_name;
 use crate::math::rgb::Rgb;
 use crate::render::inspect::{Inspection, PathVertex, PhotonRow, Situation};
 use crate::render::pass::Pass;
@@ -28,6 +30,9 @@ pub fn text(pass: &Pass, found: &Inspection, sort: usize, limit: usize) -> Strin
     }
     out.push_str(&values(found));
     out.push_str(&photons(pass, found, sort, limit));
+    for g in &found.gatherings {
+        out.push_str(&inspect_rays::text(pass, found, g, limit));
+    }
     out.push_str(&plan(pass));
     out
 }
@@ -82,24 +87,31 @@ fn values(found: &Inspection) -> String {
         "counting",
         "direct and emitted",
         "photons",
+        "final gathering",
         "sum",
         "pixel W/(m² sr)",
     ]);
     for (e, of) in found.estimators.iter().enumerate() {
         let counting = found.rows.iter().filter(|r| r.weights[e] != 0.0).count();
         let sum = found.sum(e);
+        let photons = found.rows.iter().filter_map(|r| r.contributions.get(e)).fold(Rgb::ZERO, |sum, c| sum + *c);
+        let gathered = found.gathering(e).map_or(Rgb::ZERO, |g| g.sum().as_vec3());
         table.row([
             format!("  {}", of.name),
             format!("{0}x{0}", of.rays_per_axis),
             of.gathered.to_string(),
             counting.to_string(),
             color(of.base),
-            color((sum - of.base).max(Rgb::ZERO)),
+            color(photons),
+            found.gathering(e).map_or("-".into(), |_| color(gathered)),
             color(sum),
             color(of.value),
         ]);
     }
-    format!("\nvalues: the pixel is that of `cusp render`; the sum is that of the rows below\n{}", table.text())
+    format!(
+        "\nvalues: the pixel is that of `cusp render`; the sum is that of the rows and rays below\n{}",
+        table.text()
+    )
 }
 
 fn photons(pass: &Pass, found: &Inspection, sort: usize, limit: usize) -> String {
@@ -111,7 +123,7 @@ fn photons(pass: &Pass, found: &Inspection, sort: usize, limit: usize) -> String
         ["  photon", "hit", "position m", "power W", "half-axes m", "condition", "distance", "fig. 10"]
             .map(Into::into)
             .into();
-    heading.extend(found.estimators.iter().map(|e| e.name.split(':').next().unwrap_or_default().to_owned()));
+    heading.extend(found.estimators.iter().map(|e| short_name(&e.name)));
     let mut table = Table::new(heading);
     for r in &found.rows[..shown] {
         table.row(row(pass, r));
@@ -155,7 +167,7 @@ fn plan(pass: &Pass) -> String {
 }
 
 /// Four digits, with an exponent where they would not fit.
-fn number(x: f32) -> String {
+pub(super) fn number(x: f32) -> String {
     match x.abs() {
         0.0 => "0".into(),
         a if !(1e-3..1e5).contains(&a) => format!("{x:.3e}"),
@@ -167,17 +179,17 @@ fn number(x: f32) -> String {
 }
 
 /// One number where the channels are the same.
-fn color(c: Rgb) -> String {
+pub(super) fn color(c: Rgb) -> String {
     if c.x == c.y && c.y == c.z { number(c.x) } else { vector(c) }
 }
 
 /// A position in the coordinates of the scene file.
-fn place(pass: &Pass, position: Vec3) -> String {
+pub(super) fn place(pass: &Pass, position: Vec3) -> String {
     let p = position.as_dvec3() + pass.scene.origin;
     vector(p.as_vec3())
 }
 
-fn vector(v: Vec3) -> String {
+pub(super) fn vector(v: Vec3) -> String {
     v.to_array().map(number).join(" ")
 }
 

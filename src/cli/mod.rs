@@ -6,6 +6,7 @@ pub mod diff;
 pub mod failure;
 pub mod flags;
 pub mod inspect;
+mod inspect_rays;
 mod inspect_report;
 mod inspect_text;
 pub mod lists;

@@ -179,10 +179,18 @@ fn stop_line(r: &RenderReport, rule: &StopRule) -> String {
 fn summary(r: &RenderReport, path: &str, rule: &StopRule) -> String {
     let s = &r.seconds;
     let stored = &r.photons_stored;
+    let final_gather = match s.final_gather {
+        0.0 => String::new(),
+        t => format!("final gathering {t:.3}, "),
+    };
+    let gathered = r
+        .final_gather
+        .as_ref()
+        .map_or(String::new(), |f| format!("final gathering: {}\n  {}\n", r.gather_counts.line(), f.line()));
     format!(
         "{path}: {} by {}, {}x{}, {} passes\n\
          photons: {} emitted; stored {} direct, {} caustic, {} global\n\
-         seconds: load {:.3}, bvh {:.3}, plan {:.3}, photons {:.3}, maps {:.3}, view rays {:.3}, gather {:.3}, estimate {:.3}, other {:.3}; total {:.3}\n{}",
+         seconds: load {:.3}, bvh {:.3}, plan {:.3}, photons {:.3}, maps {:.3}, view rays {:.3}, gather {:.3}, estimate {:.3}, {final_gather}other {:.3}; total {:.3}\n{}",
         r.provenance.scene,
         r.estimator,
         r.size[0],
@@ -203,5 +211,6 @@ fn summary(r: &RenderReport, path: &str, rule: &StopRule) -> String {
         s.other,
         s.total,
         stop_line(r, rule)
-    ) + &r.bounded.lines().iter().map(|l| format!("{l}\n")).collect::<String>()
+    ) + &gathered
+        + &r.bounded.lines().iter().map(|l| format!("{l}\n")).collect::<String>()
 }

@@ -7,7 +7,6 @@ use crate::cli::{print, to_json, window};
 use crate::export::{Provenance, png_file};
 use crate::workbench::Workbench;
 use crate::workbench::actions::Action;
-use crate::workbench::document::Opened;
 use crate::workbench::overlays;
 use crate::workbench::shot::{NoShot, Shot};
 use clap::Args;
@@ -35,9 +34,15 @@ pub struct ShotArgs {
     /// Pixel to pin and inspect, as in 256,200
     #[arg(long, value_name = "X,Y", value_parser = flags::pixel)]
     pixel: Option<[u32; 2]>,
-    /// Overlays to draw: footprint, photons, samples, polygons, tiles, path
+    /// Overlays to draw: footprint, photons, samples, polygons, tiles, path, gather_rays, irradiance
     #[arg(long, value_name = "A,B", value_delimiter = ',')]
     overlays: Vec<String>,
+    /// Gather ray of the pinned pixel to choose, from 1, the strongest; of the first panel with final gathering
+    #[arg(long, value_name = "N", requires = "pixel", value_parser = clap::value_parser!(u32).range(1..))]
+    ray: Option<u32>,
+    /// Layer of the irradiance pyramid that the overlay draws, from 0, the most detailed
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    layer: usize,
     /// Panel, from 1, that fills the middle
     #[arg(long, value_name = "N")]
     maximize: Option<usize>,
@@ -78,13 +83,13 @@ pub fn run(args: &ShotArgs) -> Result<(), Failure> {
             session.overlays.push(name.clone());
         }
     }
-    let panels = session.panels.len();
+    listen_for_interrupts();
+    args.flags.set_threads()?;
+    let opened = window::opened(session, &args.flags, path.is_some())?;
+    let panels = opened.session().panels.len();
     if args.maximize.is_some_and(|n| !(1..=panels).contains(&n)) {
         return Err(Failure::Call(format!("--maximize: panels are numbered 1 to {panels}")));
     }
-    listen_for_interrupts();
-    args.flags.set_threads()?;
-    let opened = Opened::new(session).map_err(Failure::Call)?;
     let mut shot = Shot::new(opened, path, args.window, 1.0).map_err(|e| Failure::Work(e.to_string()))?;
     prepare(args, shot.workbench())?;
     let picture = take(args, &mut shot)?;
@@ -119,6 +124,7 @@ fn prepare(args: &ShotArgs, workbench: &mut Workbench) -> Result<(), Failure> {
         }
         workbench.run(Action::Pin(pixel));
     }
+    workbench.show_gathering(args.ray.map(|n| n as usize - 1), args.layer);
     if let Some(panel) = args.maximize {
         workbench.run(Action::Maximize(panel - 1));
     }

@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 /// A wrong call, or what the comparison returns.
 pub fn run(scene: String, flags: CommonFlags) -> Result<(), Failure> {
     let (session, path) = session(&scene, &flags)?;
-    let opened = Opened::new(session).map_err(Failure::Call)?;
+    let opened = opened(session, &flags, path.is_some())?;
     let why = match window::display() {
         Ok(()) => {
             flags.set_threads()?;
@@ -31,6 +31,34 @@ pub fn run(scene: String, flags: CommonFlags) -> Result<(), Failure> {
         eprintln!("There is no window ({why}): comparing the estimators on {scene}.");
     }
     compare::run(&CompareArgs::of(scene, flags))
+}
+
+/// Opens the session's scene, and gives panels the final gathering that was asked for: by flag or in a session's `[render]`
+/// those that name none, and without a session by flag or in the scene file, where it takes the place of the first four
+/// panels as in `compare`.
+///
+/// # Errors
+/// Anything wrong in the scene, an edit or a setting.
+pub fn opened(session: Session, flags: &CommonFlags, of_file: bool) -> Result<Opened, Failure> {
+    let named = session.render.final_gather.is_some();
+    let opened = Opened::new(session).map_err(Failure::Call)?;
+    let settings = opened.settings();
+    if settings.final_gather == "none" || of_file && !named {
+        return Ok(opened);
+    }
+    let panels = opened.session().panels.clone();
+    // Ways of final gathering are compared under one estimator.
+    let own = if of_file || flags.estimator.is_some() { panels } else { vec![Panel::of(&settings.estimator)] };
+    let mut all = Vec::new();
+    for panel in own {
+        if panel.image.is_some() {
+            all.push(panel);
+            continue;
+        }
+        let each = settings.with_final_gathering(&[registry::estimator(&panel.estimator)?])?;
+        all.extend(each.iter().map(|e| Panel { estimator: e.name(), ..panel.clone() }));
+    }
+    Ok(opened.with_panels(all))
 }
 
 /// The session of a scene or session file with the flags on top, and the session's own file.

@@ -44,7 +44,8 @@ pub enum GatherPattern {
     Spiral,
 }
 
-const PATTERNS: [(&str, GatherPattern); 3] =
+/// All patterns, with their names in flags and files.
+pub const PATTERNS: [(&str, GatherPattern); 3] =
     [("spiral", GatherPattern::Spiral), ("sobol", GatherPattern::Sobol), ("stratified", GatherPattern::Stratified)];
 
 /// Which estimates under a footprint count.
@@ -56,7 +57,9 @@ pub enum FootprintReach {
     Facing,
 }
 
-const REACHES: [(&str, FootprintReach); 2] = [("surface", FootprintReach::Surface), ("facing", FootprintReach::Facing)];
+/// Both, with their names in flags and files.
+pub const REACHES: [(&str, FootprintReach); 2] =
+    [("surface", FootprintReach::Surface), ("facing", FootprintReach::Facing)];
 
 const CORRECTED: [(&str, bool); 2] = [("corrected", false), ("as_published", true)];
 

@@ -181,6 +181,22 @@ fn split_list(text: &str) -> Vec<String> {
     specs
 }
 
+/// The parts of an estimator's name: id, own settings, and final gathering with its settings; empty where there are none.
+pub fn parts(name: &str) -> (&str, &str, &str) {
+    let (own, gathering) = name.split_once('+').unwrap_or((name, ""));
+    let (id, settings) = own.split_once(':').unwrap_or((own, ""));
+    (id, settings, gathering)
+}
+
+/// An estimator's name without settings, as `multi_sampled`, or `multi_sampled+classic` with final gathering.
+pub fn short_name(name: &str) -> String {
+    let (id, _, gathering) = parts(name);
+    match gathering.split(':').next() {
+        Some(method) if !method.is_empty() => format!("{id}+{method}"),
+        _ => id.to_owned(),
+    }
+}
+
 /// Names of all estimators, separated by commas.
 pub fn names() -> String {
     ESTIMATORS.iter().map(|e| e.id).collect::<Vec<_>>().join(", ")
@@ -229,6 +245,16 @@ mod tests {
         assert_eq!(n.as_deref(), Some("multi_sampled:n=4,grid=cells+classic:rays=200"));
         assert_eq!(with("integrated", "rays", "4"), Ok(None));
         assert!(with("multi_sampled", "n", "1").is_err() && with("sharp", "n", "2").is_err());
+    }
+
+    #[test]
+    fn names_fall_into_parts() {
+        let name = "multi_sampled:n=8,grid=cells+classic:rays=200";
+        assert_eq!(parts(name), ("multi_sampled", "n=8,grid=cells", "classic:rays=200"));
+        assert_eq!(parts("integrated+none"), ("integrated", "", "none"));
+        assert_eq!(parts("integrated"), ("integrated", "", ""));
+        let short = [name, "integrated+classic:rays=2", "density:kernel=cone", "regular"].map(short_name);
+        assert_eq!(short, ["multi_sampled+classic", "integrated+classic", "density", "regular"]);
     }
 
     #[test]

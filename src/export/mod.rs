@@ -2,6 +2,7 @@
 
 pub mod exr_file;
 pub mod false_color;
+pub mod final_gather;
 pub mod names;
 pub mod panel_files;
 pub mod plot;

@@ -1,6 +1,8 @@
 //! Reports of a render and of a comparison, as JSON and CSV.
 
 use crate::export::Provenance;
+use crate::export::final_gather::FinalGatherReport;
+use crate::final_gather::GatherCounts;
 use crate::measure::ErrorMetrics;
 use crate::render::film::Rect;
 use crate::render::memory::MemoryNeed;
@@ -36,6 +38,10 @@ pub struct RenderReport {
     pub photons_stored: StoredCounts,
     /// Wall seconds.
     pub seconds: Seconds,
+    /// Rays of final gathering in all passes, and how they ended.
+    pub gather_counts: GatherCounts,
+    /// Final gathering of `estimator` in the last pass, if it runs.
+    pub final_gather: Option<FinalGatherReport>,
     /// What ended the render; none for a comparison, whose work is fixed.
     pub stopped_by: Option<StoppedBy>,
     /// Error of the image as its passes tell it, of `estimator`; none below 12 passes.
@@ -69,6 +75,8 @@ impl RenderReport {
             photons_emitted: renderer.emitted(),
             photons_stored: renderer.stored(),
             seconds: Seconds { load, ..*renderer.seconds() }.within(total),
+            gather_counts: *renderer.gather_counts(),
+            final_gather: final_gather(renderer, 0),
             stopped_by: None,
             error_estimate: renderer.error_estimate(),
             peak_rss_bytes: peak_rss_bytes(),
@@ -79,6 +87,12 @@ impl RenderReport {
             plan: renderer.plan().clone(),
         }
     }
+}
+
+/// Final gathering of estimator `index` in the last pass, if it runs.
+pub fn final_gather(renderer: &Renderer, index: usize) -> Option<FinalGatherReport> {
+    let estimator = renderer.estimators().get(index)?;
+    FinalGatherReport::new(renderer.last_pass()?, estimator.as_ref())
 }
 
 /// Seconds of one estimator in a comparison.
@@ -98,6 +112,10 @@ pub struct EstimatorReport {
     pub id: String,
     /// Settings, empty without.
     pub settings: String,
+    /// Final gathering, if it was asked for: as the command line takes it.
+    pub final_gathering: Option<String>,
+    /// What it looked things up in, if it runs.
+    pub final_gather: Option<FinalGatherReport>,
     /// Wall seconds.
     pub seconds: EstimatorSeconds,
     /// Seconds of the view pass over those of `regular`, if it took part.
@@ -143,11 +161,20 @@ pub struct CompareReport {
     pub estimators: Vec<EstimatorReport>,
 }
 
+impl EstimatorReport {
+    /// Its name, with settings and final gathering.
+    pub fn name(&self) -> String {
+        let colon = if self.settings.is_empty() { "" } else { ":" };
+        let own = format!("{}{colon}{}", self.id, self.settings);
+        self.final_gathering.as_ref().map_or(own.clone(), |f| format!("{own}+{f}"))
+    }
+}
+
 impl CompareReport {
     /// One line for each estimator.
     pub fn timings_csv(&self) -> String {
         let mut csv = String::from(
-            "estimator,settings,view_trace_s,gather_s,estimate_s,view_pass_s,ratio_to_regular,photons_per_pixel,rmse,relative_rmse,relative_mse,reference_relative_rmse\n",
+            "estimator,settings,view_trace_s,gather_s,estimate_s,final_gather_s,view_pass_s,ratio_to_regular,photons_per_pixel,rmse,relative_rmse,relative_mse,reference_relative_rmse,final_gather\n",
         );
         let number = |x: Option<f64>| x.map_or(String::new(), |x| format!("{x:.6}"));
         for e in &self.estimators {
@@ -155,12 +182,13 @@ impl CompareReport {
             // Writing to a string cannot fail.
             let _ = writeln!(
                 csv,
-                "{},\"{}\",{:.6},{:.6},{:.6},{:.6},{},{:.3},{},{},{},{}",
+                "{},\"{}\",{:.6},{:.6},{:.6},{:.6},{:.6},{},{:.3},{},{},{},{},\"{}\"",
                 e.id,
                 e.settings,
                 s.parts.view_trace,
                 s.parts.gather,
                 s.parts.estimate,
+                s.parts.final_gather,
                 s.view_pass,
                 number(e.ratio_to_regular),
                 e.photons_per_pixel,
@@ -168,6 +196,7 @@ impl CompareReport {
                 number(e.error.map(|e| e.relative_rmse)),
                 number(e.error.map(|e| e.relative_mse)),
                 number(e.reference_error.map(|e| e.relative_rmse)),
+                e.final_gathering.as_deref().unwrap_or(""),
             );
         }
         csv

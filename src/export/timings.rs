@@ -66,7 +66,7 @@ impl Timings {
     /// One line for each estimator. Empty fields are unknown.
     pub fn csv(&self) -> String {
         let mut csv = String::from(
-            "estimator,passes,photons_and_maps_s,view_trace_s,gather_s,estimate_s,total_s,photons_emitted,rmse,relative_rmse,relative_mse\n",
+            "estimator,passes,photons_and_maps_s,view_trace_s,gather_s,estimate_s,final_gather_s,total_s,photons_emitted,rmse,relative_rmse,relative_mse\n",
         );
         let number = |x: Option<f64>| x.map_or(String::new(), |x| format!("{x:.6e}"));
         for e in &self.estimators {
@@ -74,13 +74,14 @@ impl Timings {
             // Writing to a string cannot fail.
             let _ = writeln!(
                 csv,
-                "\"{}\",{},{:.6},{:.6},{:.6},{:.6},{:.6},{},{},{},{}",
+                "\"{}\",{},{:.6},{:.6},{:.6},{:.6},{:.6},{:.6},{},{},{},{}",
                 e.estimator,
                 e.passes,
                 s.photons_and_maps,
                 s.view.view_trace,
                 s.view.gather,
                 s.view.estimate,
+                s.view.final_gather,
                 s.total,
                 self.photons_emitted,
                 number(e.error.map(|e| e.rmse)),

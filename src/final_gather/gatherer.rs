@@ -36,6 +36,16 @@ pub struct GatherCounts {
     pub unknown: u64,
 }
 
+impl GatherCounts {
+    /// One line for people.
+    pub fn line(&self) -> String {
+        let Self { rays, open, second, empty_footprints, unknown } = self;
+        format!(
+            "{rays} rays, {open} met nothing, {second} gathered a second time, {empty_footprints} footprints held no estimate, {unknown} ended where no light is known"
+        )
+    }
+}
+
 impl AddAssign for GatherCounts {
     fn add_assign(&mut self, o: Self) {
         self.rays += o.rays;
@@ -63,6 +73,8 @@ pub struct RecordedRay {
     pub radius: f32,
     /// The surface at its end.
     pub hit: Option<GatherHit>,
+    /// How it ended without one.
+    pub missed: Option<NoHit>,
     /// What its irradiance came from.
     pub used: Used,
     /// Estimates that count: layer and index.
@@ -184,12 +196,22 @@ impl<'a> FinalGatherer<'a> {
                     scratch.counts.unknown += u64::from(used == Used::None);
                 }
             }
-            let hit = end.ok();
+            let (hit, missed) = (end.ok(), end.err());
             let contribution = hit.map_or(DVec3::ZERO, |h| irradiance * h.weight.as_dvec3() * share);
             sum += contribution;
             if R::LISTENS {
                 let (irradiance, contribution) = (in_f32(irradiance).0, in_f32(contribution).0);
-                recorder.ray(RecordedRay { direction, radius, hit, used, estimates, second, irradiance, contribution });
+                recorder.ray(RecordedRay {
+                    direction,
+                    radius,
+                    hit,
+                    missed,
+                    used,
+                    estimates,
+                    second,
+                    irradiance,
+                    contribution,
+                });
             }
         }
         sum

@@ -134,6 +134,11 @@ impl GatherMaps {
         self.photon_seconds + layers
     }
 
+    /// Seconds to build the tree over all photons.
+    pub fn photon_seconds(&self) -> f64 {
+        self.photon_seconds
+    }
+
     /// Seconds to build all of it.
     pub fn all_seconds(&self) -> f64 {
         self.photon_seconds + self.pyramids().map(|p| p.seconds().first + p.seconds().others).sum::<f64>()

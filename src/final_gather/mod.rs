@@ -10,7 +10,7 @@ pub mod maps;
 #[cfg(test)]
 mod tests;
 
-pub use gather_ray::{GatherHit, GatherPoint};
+pub use gather_ray::{GatherHit, GatherPoint, NoHit};
 pub use gatherer::{FinalGatherer, GatherCounts, GatherRecorder, GatherScratch, RecordedRay, Unrecorded};
 pub use lookup::Used;
 pub use maps::GatherMaps;

@@ -1,6 +1,7 @@
 //! Images of how an estimator made its image in one pass.
 
 use crate::estimate::Estimator;
+use crate::estimate::final_gathering::WithFinalGathering;
 use crate::estimate::integrated::Integrated;
 use crate::math::rgb::{Rgb, mean};
 use crate::photons::MapPhoton;
@@ -37,7 +38,7 @@ pub enum Heatmap {
     /// the k nearest do better than that; several photons of one path do worse. Noise of shadow rays is not in it.
     StandardError,
     /// Light of photons under the estimator minus that under `integrated` with overlap, on the same photons; the mean
-    /// channel, signed.
+    /// channel, signed. What final gathering brings is left out on both sides.
     ToExact,
     /// Time that one thread spent on the pixel's tile for this estimator.
     TileMilliseconds,
@@ -96,6 +97,20 @@ impl Heatmap {
         self == Self::ToExact
     }
 
+    /// What it leaves out under an estimator with final gathering, for people; None if nothing.
+    pub fn with_final_gathering(self) -> Option<&'static str> {
+        match self {
+            Self::Photons | Self::LargestFootprint | Self::GatherRadius | Self::Condition => Some(
+                "of photons around view hits, which here bring caustics alone; not of those that gather rays look up",
+            ),
+            Self::StandardError => {
+                Some("of caustics alone; noise of gather rays, and of what they look up, is not in it")
+            }
+            Self::ToExact => Some("of caustics alone: what final gathering brings is left out on both sides"),
+            Self::TileMilliseconds => None,
+        }
+    }
+
     /// The one of that [`Heatmap::id`].
     pub fn parse(id: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|h| h.id() == id)
@@ -112,7 +127,11 @@ pub struct HeatmapPass<'a> {
 
 /// What `integrated` with overlap needs and the pass may lack.
 struct Exact {
+    /// With the same final gathering as the estimator, so that it looks into the same maps.
+    estimator: Box<dyn Estimator>,
     plan: Plan,
+    /// The pass's plan without final gathering: what that brings is no matter of photons around a hit.
+    own_plan: Plan,
     /// None if those of the pass will do.
     maps: Option<PhotonMaps>,
 }
@@ -125,7 +144,7 @@ impl<'a> HeatmapPass<'a> {
     pub fn new(pass: &'a Pass, estimator: &'a dyn Estimator, kind: Heatmap) -> Result<Self, InspectError> {
         let slot = Slot::new(estimator, pass.settings.gather);
         check(pass, &slot)?;
-        let exact = if kind == Heatmap::ToExact { Some(Exact::new(pass)?) } else { None };
+        let exact = if kind == Heatmap::ToExact { Some(Exact::new(pass, estimator)?) } else { None };
         Ok(Self { pass, slot, kind, exact })
     }
 
@@ -163,8 +182,10 @@ impl<'a> HeatmapPass<'a> {
                 vec![(seconds * 1e3) as f32; pixels]
             }
             (_, Some(exact)) => {
-                let own = light_of_photons(&self.pass.view(), &self.slot, rect, scratch);
-                let integrated = Slot { estimator: &Integrated, gather: Gather::Overlap };
+                let view = self.pass.view();
+                let view = ViewPass { tracer: ViewTracer { plan: &exact.own_plan, ..view.tracer }, ..view };
+                let own = light_of_photons(&view, &self.slot, rect, scratch);
+                let integrated = Slot { estimator: exact.estimator.as_ref(), gather: Gather::Overlap };
                 let truth = light_of_photons(&exact.view(self.pass), &integrated, rect, scratch);
                 own.iter().zip(truth).map(|(o, t)| mean(*o) - mean(t)).collect()
             }
@@ -235,7 +256,11 @@ pub fn heatmap(
 }
 
 impl Exact {
-    fn new(pass: &Pass) -> Result<Self, InspectError> {
+    fn new(pass: &Pass, of: &dyn Estimator) -> Result<Self, InspectError> {
+        let estimator: Box<dyn Estimator> = match of.final_gathering() {
+            Some(f) => Box::new(WithFinalGathering::new(Box::new(Integrated), *f)),
+            None => Box::new(Integrated),
+        };
         let mut plan = pass.plan.clone();
         plan.view_differentials |= plan.needs_photons();
         let maps = (!plan.overlap && plan.needs_photons()).then(|| {
@@ -243,11 +268,13 @@ impl Exact {
             PhotonMaps::with_parts(&pass.scene, &plan, &pass.photons.stored, pass.scale(), parts)
         });
         plan.overlap |= maps.is_some();
-        let slot = Slot { estimator: &Integrated, gather: Gather::Overlap };
-        match plan.lacks(&slot) {
-            Some(part) => Err(InspectError::Lacks { estimator: slot.estimator.name(), part }),
-            None => Ok(Self { plan, maps }),
+        let slot = Slot { estimator: estimator.as_ref(), gather: Gather::Overlap };
+        if let Some(part) = plan.lacks(&slot) {
+            return Err(InspectError::Lacks { estimator: estimator.name(), part });
         }
+        plan.final_gatherings.clear();
+        let own_plan = Plan { final_gatherings: Vec::new(), ..pass.plan.clone() };
+        Ok(Self { estimator, plan, own_plan, maps })
     }
 
     fn view<'a>(&'a self, pass: &'a Pass) -> ViewPass<'a> {
@@ -399,6 +426,37 @@ mod tests {
         }
         let times = made(&p, "density", Heatmap::TileMilliseconds);
         assert!(times.iter().all(|t| *t > 0.0) && times.len() == 48 * 40);
+    }
+
+    /// What is left of a panel with final gathering: the caustics, by the same photons as without it.
+    #[test]
+    fn heatmaps_of_final_gathering_are_those_of_caustics() {
+        let p = pass("glass_sphere", "regular,regular+classic:rays=4,integrated", "overlap", 1);
+        assert!(p.plan.gathers() && p.maps.global.is_some());
+        let [photons, all] = ["regular+classic:rays=4", "regular"].map(|n| made(&p, n, Heatmap::Photons));
+        assert!(photons.iter().zip(&all).all(|(c, a)| c <= a) && photons.iter().sum::<f32>() < all.iter().sum());
+        assert!(photons.iter().any(|n| *n > 0.0));
+        let e = estimator("regular+classic:rays=4").expect("registered");
+        let difference = made(&p, "regular+classic:rays=4", Heatmap::ToExact);
+        // By the inspector's rows: caustic light under regular less that under integrated.
+        let list = estimators("regular,integrated").expect("registered");
+        let mut lit = 0;
+        for i in (0..48 * 40).step_by(31) {
+            let found = inspect(&p, &list, [i % 48, i / 48]).expect("inside");
+            let caustic = found.rows.iter().filter(|r| r.kind == crate::photons::PhotonKind::Caustic);
+            let [own, exact] = caustic.fold([0.0; 2], |[a, b], r| {
+                [a + f64::from(mean(r.contributions[0])), b + f64::from(mean(r.contributions[1]))]
+            });
+            let error = (f64::from(difference[i as usize]) - (own - exact)).abs();
+            assert!(error <= 1e-5 * own.max(exact), "{i}: {} {own} {exact}", difference[i as usize]);
+            lit += u32::from(own > 0.0);
+        }
+        assert!(lit > 5, "{lit}");
+        // A pass that gathers finally alone has no global map, and needs none for it.
+        let p = pass("glass_sphere", &e.name(), "overlap", 1);
+        assert!(p.maps.global.is_none());
+        let alone = made(&p, &e.name(), Heatmap::ToExact);
+        assert!(alone.iter().all(|v| v.is_finite()));
     }
 
     #[test]

@@ -117,6 +117,7 @@ impl Pass {
             pass: self.number,
             flat: self.flat.as_deref(),
             area_factor: self.area_factor as f32,
+            gather_rays: u32::MAX,
             tile: TILE,
         }
     }

@@ -37,6 +37,9 @@ pub(super) fn next_area(area: f64, pass: u32) -> f64 {
 /// Pixels across and down that one pixel of a draft stands for.
 pub const DRAFT_SCALE: u32 = 4;
 
+/// Most rays of final gathering from a hit in a draft.
+pub const DRAFT_GATHER_RAYS: u32 = 16;
+
 /// How a step ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Step {
@@ -380,7 +383,8 @@ impl Renderer {
         let watch = FilmWatch { watch, estimators: now, films: &films, draft };
         // The tiles of a draft cover those of a pass, so that its first ones come soon.
         let tile = if draft { TILE / DRAFT_SCALE } else { TILE };
-        let view = ViewPass { tile, ..pass.view() };
+        let gather_rays = if draft { DRAFT_GATHER_RAYS } else { u32::MAX };
+        let view = ViewPass { tile, gather_rays, ..pass.view() };
         let result = view.run(Rect::whole(pass.settings.size), &chosen, &watch);
         result.complete.then_some(result)
     }

@@ -1,7 +1,7 @@
 //! The view pass: tile by tile, the same photons under every estimator in turn.
 
 use crate::estimate::registry::needs_view_footprint;
-use crate::estimate::{Gathered, Lookup};
+use crate::estimate::{FinalGathering, Gathered, Lookup};
 use crate::final_gather::gather_ray::GatherTracer;
 use crate::final_gather::{FinalGatherer, GatherCounts, GatherMaps, GatherScratch, Unrecorded as Unheard};
 use crate::math::hash::mix;
@@ -92,6 +92,8 @@ pub struct ViewPass<'a> {
     pub flat: Option<&'a FlatPixels>,
     /// Area of footprints relative to the first pass.
     pub area_factor: f32,
+    /// Most rays of final gathering from a hit; fewer than asked for in a draft.
+    pub gather_rays: u32,
     /// Pixels along a tile's side, at least 1. It decides no pixel.
     pub tile: u32,
 }
@@ -393,9 +395,10 @@ impl ViewPass<'_> {
     /// What gathers global light for a slot, if final gathering does.
     pub fn gatherer(&self, slot: &Slot) -> Option<FinalGatherer<'_>> {
         let t = &self.tracer;
-        let settings = t.plan.final_gathering(slot.estimator)?;
+        let asked = t.plan.final_gathering(slot.estimator)?;
+        let settings = FinalGathering { rays: asked.rays.min(self.gather_rays), ..*asked };
         let tracer = GatherTracer { scene: t.scene, intersector: t.intersector, max_depth: t.settings.max_depth };
-        Some(FinalGatherer::new(tracer, settings, self.gathering))
+        Some(FinalGatherer::new(tracer, &settings, self.gathering))
     }
 
     /// Traces and gathers for a tile as [`ViewPass::run`] does, and keeps what was found: four bytes for each photon of

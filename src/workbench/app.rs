@@ -112,6 +112,7 @@ impl Workbench {
         self.ask_images();
         self.ask_values();
         self.ask_photons();
+        self.ask_estimates();
         let held = ui.input(|i| i.pointer.any_down());
         let change = self.document.settle(held);
         self.follow(change, Step::New);
@@ -199,6 +200,7 @@ impl Workbench {
                 self.messages.error(why);
             }
             Finding::Photons(photons) => self.desk.visible_photons = photons,
+            Finding::Estimates(estimates) => self.desk.visible_estimates = estimates,
             Finding::Inspected(Ok(found)) => self.desk.inspector.take(*found),
             Finding::Inspected(Err(why)) => self.messages.error(why),
             Finding::Path(path) => self.desk.inspector.path = path,
@@ -470,6 +472,13 @@ impl Workbench {
     /// window is idle, the same session gives the same picture.
     pub fn for_pictures(&mut self) {
         self.desk.untimed = true;
+    }
+
+    /// Chooses a gather ray of the pixel that is pinned next, by its place in the list from 0, and the layer of the irradiance
+    /// pyramid that the overlay draws.
+    pub fn show_gathering(&mut self, ray: Option<usize>, layer: usize) {
+        self.desk.inspector.wanted_ray = ray;
+        self.desk.shown_estimates.layer = layer;
     }
 
     /// The session, for tests and for saving.

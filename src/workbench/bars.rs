@@ -9,7 +9,7 @@ use super::messages::{Gravity, Messages};
 use super::panes::widgets::name;
 use super::render::Render;
 use super::theme::{count, mono, number};
-use crate::estimate::registry::ESTIMATORS;
+use crate::estimate::registry::{ESTIMATORS, short_name};
 use crate::export::session::Mode;
 use crate::math::rgb::luminance;
 use crate::render::StoppedBy;
@@ -126,7 +126,7 @@ fn progress(render: &Render, desk: &Desk) -> String {
     // Writing to a string cannot fail.
     if let Some(p) = &render.progress {
         let s = &p.seconds;
-        let total = s.photon_trace + s.map_build + s.view_trace + s.gather + s.estimate;
+        let total = s.photon_trace + s.map_build + s.view_trace + s.gather + s.estimate + s.final_gather;
         let _ = write!(text, "pass {} / {}", p.passes.iter().min().unwrap_or(&0), desk.seconds(total));
         let _ = write!(text, "   photons {}", count(p.emitted));
         for (n, kind) in [(p.stored.direct, "direct"), (p.stored.caustic, "caustic"), (p.stored.global, "global")] {
@@ -213,7 +213,7 @@ pub fn readout(document: &Document, gallery: &Gallery, render: &Render, desk: &D
     for (i, panel) in document.session.panels.iter().enumerate() {
         let Some(value) = gallery.of(panel).and_then(|i| i.at(pixel)) else { continue };
         let number_of = gallery.values.get(&i).and_then(|v| Some((v.at(pixel)?, v)));
-        let name = panel.image.as_deref().unwrap_or(&panel.estimator).split(':').next().unwrap_or("");
+        let name = panel.image.clone().unwrap_or_else(|| short_name(&panel.estimator));
         let [r, g, b] = value.to_array().map(|x| number(f64::from(x)));
         let _ = write!(text, "  {name} {r} {g} {b} Y {}", number(f64::from(luminance(value))));
         if let Some((x, v)) = number_of {

@@ -5,6 +5,7 @@ use super::areas::Areas;
 use super::dialogs::Dialogs;
 use super::gallery::values::{Origin, Values};
 use super::inspector::{FoundPath, Inspected, Inspector};
+use super::overlays::estimates::{Shown, VisibleEstimates};
 use super::overlays::photons::VisiblePhotons;
 use super::recent::Recent;
 use super::worker::messages::{Job, Progress};
@@ -30,6 +31,8 @@ pub enum Kind {
     Values(usize),
     /// Photons that the camera sees.
     Photons,
+    /// Irradiance estimates that the camera sees.
+    Estimates,
     /// The pinned pixel.
     Inspect,
     /// A photon's path.
@@ -54,6 +57,8 @@ pub enum Finding {
     Values(usize, Result<Values, String>),
     /// Photons that the camera sees.
     Photons(VisiblePhotons),
+    /// Irradiance estimates that the camera sees; none without a pyramid.
+    Estimates(Option<VisibleEstimates>),
     /// The pinned pixel taken apart.
     Inspected(Result<Box<Inspected>, String>),
     /// The path of a photon.
@@ -141,6 +146,12 @@ pub struct Desk {
     pub visible_photons: VisiblePhotons,
     /// The pass that they are of, by its address.
     pub photons_of: Option<usize>,
+    /// Which irradiance estimates the overlay draws.
+    pub shown_estimates: Shown,
+    /// The estimates, for the overlay.
+    pub visible_estimates: Option<VisibleEstimates>,
+    /// The pass that they are of, by its address, and which were asked for.
+    pub estimates_of: Option<(usize, Shown)>,
     /// Footprint areas of the last pass.
     pub areas: Areas,
     /// What was opened last.

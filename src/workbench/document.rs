@@ -2,7 +2,7 @@
 
 use super::history::History;
 use super::worker::messages::Job;
-use crate::export::session::Session;
+use crate::export::session::{Panel, Session};
 use crate::render::RenderSettings;
 use crate::render::memory::check_images;
 use crate::scene::scene_file::SceneFile;
@@ -55,6 +55,23 @@ impl Opened {
         let (source, scene) = session.open_scene().map_err(|e| e.to_string())?;
         let settings = settings(&scene, &session)?;
         Ok(Self { session, source, scene: Arc::new(scene), settings })
+    }
+
+    /// The session.
+    pub fn session(&self) -> &Session {
+        &self.session
+    }
+
+    /// The settings.
+    pub fn settings(&self) -> &RenderSettings {
+        &self.settings
+    }
+
+    /// The same with other panels, which hold all final gathering: none is asked for beside them any more.
+    pub fn with_panels(mut self, panels: Vec<Panel>) -> Self {
+        self.session.panels = panels;
+        (self.session.render.final_gather, self.session.render.final_gather_rays) = (None, None);
+        self
     }
 }
 

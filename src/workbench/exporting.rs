@@ -3,10 +3,11 @@
 use super::app::Workbench;
 use super::desk::{Finding, Kind};
 use super::gallery::values::Values;
-use super::inspector::{Inspected, summary};
+use super::inspector::{Inspected, rays, summary};
 use super::theme::panel_color;
 use super::views::{self, shows_difference};
 use super::worker::messages::{Job, Progress};
+use crate::estimate::registry::short_name;
 use crate::export::false_color::ValueRange;
 use crate::export::panel_files::{Cut, Picture};
 use crate::export::session::{Mode, Panel, Session};
@@ -247,16 +248,20 @@ impl Export {
         }
     }
 
-    /// A table for each pinned pixel, with the name of its file.
+    /// Tables for each pinned pixel, with the names of their files: photons, and gather rays where there are any.
     fn photon_tables(&self) -> Result<Vec<(String, String)>, String> {
         let Some(pass) = &self.pass else { return Ok(Vec::new()) };
         let [w, h] = pass.settings.size;
         let pins = self.session.pins.iter().filter(|p| p[0] < w && p[1] < h);
-        let table = |pin: &[u32; 2]| {
-            let found = Inspected::new(pass, &self.job.estimators, *pin)?;
-            Ok((format!("photons-{}-{}.csv", pin[0], pin[1]), summary::csv(&found)))
-        };
-        pins.map(table).collect()
+        let mut all = Vec::new();
+        for [x, y] in pins {
+            let found = Inspected::new(pass, &self.job.estimators, [*x, *y])?;
+            all.push((format!("photons-{x}-{y}.csv"), summary::csv(&found)));
+            if found.rays.iter().any(|r| !r.is_empty()) {
+                all.push((format!("gather-rays-{x}-{y}.csv"), rays::csv(&found)));
+            }
+        }
+        Ok(all)
     }
 
     fn timings(&self, provenance: Provenance) -> Timings {
@@ -290,7 +295,7 @@ fn file_names(panel: &Panel) -> (String, String) {
         let name = format!("image-{stem}");
         return (name.clone(), name);
     }
-    let id = panel.estimator.split(':').next().unwrap_or("").to_owned();
+    let id = short_name(&panel.estimator);
     let long = match &panel.heatmap {
         Some(heatmap) => format!("{}-{heatmap}", panel.estimator),
         None => panel.estimator.clone(),

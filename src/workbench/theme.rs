@@ -1,6 +1,6 @@
 //! Looks: neutral grey around images, one colour for each estimator, numbers in a fixed-width face.
 
-use crate::estimate::registry::ESTIMATORS;
+use crate::estimate::registry::{ESTIMATORS, parts};
 use crate::export::sheet::PALETTE;
 use egui::{Color32, RichText, Visuals};
 
@@ -33,7 +33,7 @@ pub fn apply(context: &egui::Context) {
 /// Colour of the panel at `index` among the estimators `names`: that of its kind in the registry; a second panel of the
 /// same kind takes a colour that no kind in use has.
 pub fn panel_color(names: &[&str], index: usize) -> Color32 {
-    let kind = |name: &str| ESTIMATORS.iter().position(|e| Some(e.id) == name.split(':').next());
+    let kind = |name: &str| ESTIMATORS.iter().position(|e| e.id == parts(name).0);
     let first_of_kind = |i: usize| names[..i].iter().all(|n| kind(n) != kind(names[i]));
     let Some(own) = names.get(index).and_then(|n| kind(n)) else { return color(PALETTE.len() - 1) };
     if first_of_kind(index) {

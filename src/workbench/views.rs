@@ -4,6 +4,7 @@ use super::app::Workbench;
 use super::desk::{Finding, Kind};
 use super::gallery::Gallery;
 use super::gallery::values::{Origin, Values};
+use super::overlays::estimates::VisibleEstimates;
 use super::overlays::photons::VisiblePhotons;
 use super::render::Render;
 use crate::export::session::{Mode, Panel, Session};
@@ -53,6 +54,18 @@ impl Workbench {
         if self.desk.photons_of != Some(address) {
             self.desk.photons_of = Some(address);
             self.analysis.ask(Kind::Photons, move || Finding::Photons(VisiblePhotons::of(&pass)));
+        }
+    }
+
+    /// Asks for the irradiance estimates of the overlay, of the first pass as well.
+    pub(super) fn ask_estimates(&mut self) {
+        let on = self.document.session.overlays.iter().any(|o| o == "irradiance");
+        let Some(pass) = self.render.first_pass.clone().filter(|_| on) else { return };
+        let shown = self.desk.shown_estimates;
+        let wanted = (Arc::as_ptr(&pass) as usize, shown);
+        if self.desk.estimates_of != Some(wanted) {
+            self.desk.estimates_of = Some(wanted);
+            self.analysis.ask(Kind::Estimates, move || Finding::Estimates(VisibleEstimates::of(&pass, shown)));
         }
     }
 

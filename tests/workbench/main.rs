@@ -4,6 +4,7 @@
 #![allow(clippy::expect_used, clippy::panic, missing_docs, reason = "a failed expectation is how this program reports")]
 
 mod acts;
+mod gathering;
 mod painter;
 mod pictures;
 mod refusals;

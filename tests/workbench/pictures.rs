@@ -323,3 +323,45 @@ fn empty_scene() {
     settle(&mut window);
     check(&mut window, "empty_scene");
 }
+
+/// A room under final gathering, a pixel of its floor pinned, with overlays.
+fn gathering(estimator: &str, overlays: &[&str]) -> Session {
+    let overlays = overlays.iter().map(|id| (*id).to_owned()).collect();
+    let panels = vec![Panel::of(estimator)];
+    Session { panels, overlays, pins: vec![[24, 86]], ..small("two_lights", 1) }
+}
+
+const GATHERED: &str = "integrated+ray-differentials:rays=64";
+
+/// The hemisphere with the rays' discs, their table, and the chosen ray in the image.
+#[test]
+fn gather_rays_in_the_inspector() {
+    let session = beside(gathering(GATHERED, &["gather_rays"]), Pane::Inspector);
+    let mut window = open_at(session, [900.0, 600.0], 1.0);
+    window.get_by_label("gather ray 2").click();
+    settle(&mut window);
+    window.remove_cursor();
+    settle(&mut window);
+    check(&mut window, "gather_rays");
+}
+
+#[test]
+fn irradiance_overlay() {
+    let session = beside(gathering(GATHERED, &["irradiance"]), Pane::Overlays);
+    let mut window = open_at(Session { pins: vec![], ..session }, [900.0, 480.0], 1.0);
+    window.state_mut().show_gathering(None, 1);
+    settle(&mut window);
+    check(&mut window, "overlay_irradiance");
+}
+
+#[test]
+fn final_gathering_in_the_estimators_pane() {
+    let mut session = gathering("integrated+ray-differentials:rays=64,radius=0.2,near=0.1", &[]);
+    session.panels[0].heatmap = Some("photons".into());
+    picture(beside(session, Pane::Estimators), PANE, "pane_final_gathering");
+}
+
+#[test]
+fn final_gathering_in_the_plan() {
+    picture(beside(gathering(GATHERED, &[]), Pane::Plan), [640.0, 1080.0], "plan_final_gathering");
+}

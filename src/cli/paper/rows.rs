@@ -133,7 +133,7 @@ pub fn table(rows: &[Row]) -> String {
 /// One line for each row. Empty fields are unknown.
 pub fn csv(rows: &[Row]) -> String {
     let mut csv = String::from(
-        "estimator,gather,k,origin,view_trace_s,gather_s,estimate_s,view_pass_s,ratio_to_regular,photons_per_pixel,mean_ratio,black_pixels,relative_rmse,relative_rmse_to_more_rays,reference_relative_rmse\n",
+        "estimator,gather,k,origin,view_trace_s,gather_s,estimate_s,final_gather_s,view_pass_s,ratio_to_regular,photons_per_pixel,mean_ratio,black_pixels,relative_rmse,relative_rmse_to_more_rays,reference_relative_rmse\n",
     );
     let number = |x: Option<f64>| x.map_or(String::new(), |x| format!("{x:.6}"));
     for r in rows {
@@ -141,7 +141,7 @@ pub fn csv(rows: &[Row]) -> String {
         // Writing to a string cannot fail.
         let _ = writeln!(
             csv,
-            "\"{}\",{},{},{},{:.6},{:.6},{:.6},{:.6},{},{:.3},{},{},{},{},{}",
+            "\"{}\",{},{},{},{:.6},{:.6},{:.6},{:.6},{:.6},{},{:.3},{},{},{},{},{}",
             r.estimator,
             if r.k.is_some() { "knn" } else { "overlap" },
             r.k.map_or(String::new(), |k| k.to_string()),
@@ -149,6 +149,7 @@ pub fn csv(rows: &[Row]) -> String {
             s.parts.view_trace,
             s.parts.gather,
             s.parts.estimate,
+            s.parts.final_gather,
             s.view_pass,
             number(r.ratio_to_regular),
             r.photons_per_pixel,

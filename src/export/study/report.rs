@@ -1,5 +1,6 @@
 //! A study as JSON and CSV.
 
+use crate::estimate::registry;
 use crate::measure::Reference;
 use crate::measure::study::pareto::Best;
 use crate::measure::study::{Curve, Evaluation, Judge, StudyPlan};
@@ -96,18 +97,28 @@ impl<'a> StudyReport<'a> {
     pub fn csv(&self) -> String {
         let mut csv = String::from(
             "estimator,settings,gather,photons_per_pass,k,footprint_scale,seed,passes,photons,seconds,\
-             bvh_s,plan_s,photon_trace_s,map_build_s,view_trace_s,gather_s,estimate_s,other_s,\
-             mse,rmse,relative_rmse,relative_mse,trimmed_mse,trimmed_relative_mse,smape,bias,flip\n",
+             bvh_s,plan_s,photon_trace_s,map_build_s,view_trace_s,gather_s,estimate_s,final_gather_s,other_s,\
+             mse,rmse,relative_rmse,relative_mse,trimmed_mse,trimmed_relative_mse,smape,bias,flip,final_gather\n",
         );
         for curve in self.curves {
             let s = &curve.setting;
-            let (id, own) = s.estimator.split_once(':').unwrap_or((&s.estimator, ""));
+            let (id, own, final_gather) = registry::parts(&s.estimator);
             let gather = s.gather.name();
             let k = s.k.map_or(String::new(), |k| k.to_string());
             let scale = s.footprint_scale.map_or(String::new(), |f| f.to_string());
             for p in &curve.points {
                 let t = &p.parts;
-                let parts = [t.bvh, t.plan, t.photon_trace, t.map_build, t.view_trace, t.gather, t.estimate, t.other];
+                let parts = [
+                    t.bvh,
+                    t.plan,
+                    t.photon_trace,
+                    t.map_build,
+                    t.view_trace,
+                    t.gather,
+                    t.estimate,
+                    t.final_gather,
+                    t.other,
+                ];
                 let seconds = parts.map(|v| format!("{v:.6}")).join(",");
                 let errors = match &p.error {
                     None => ",".repeat(8),
@@ -130,7 +141,7 @@ impl<'a> StudyReport<'a> {
                 // Writing to a string cannot fail.
                 let _ = writeln!(
                     csv,
-                    "{id},\"{own}\",{gather},{},{k},{scale},{},{},{},{:.6},{seconds},{errors}",
+                    "{id},\"{own}\",{gather},{},{k},{scale},{},{},{},{:.6},{seconds},{errors},\"{final_gather}\"",
                     s.photons, p.seed, p.passes, p.photons, p.seconds
                 );
             }

@@ -1,5 +1,6 @@
 //! Judging: the images of a study against a reference.
 
+use crate::estimate::registry;
 use crate::measure::flip::{FlipView, flip};
 use crate::measure::metrics::compare;
 use crate::measure::reference::noise::mean_over;
@@ -152,10 +153,14 @@ impl Evaluation {
             .filter(|(groups, _)| !groups.is_empty())
             .map(|(groups, (setting, label))| {
                 let (points, summary): (Vec<_>, Vec<_>) = groups.into_iter().map(|g| (g.points, g.summary)).unzip();
-                let (_, own) = setting.estimator.split_once(':').unwrap_or(("", ""));
-                let all = [own, &setting.rest()].into_iter().filter(|s| !s.is_empty()).collect::<Vec<_>>().join(",");
+                let (_, own, gathering) = registry::parts(&setting.estimator);
+                let all = [own, gathering, &setting.rest()]
+                    .into_iter()
+                    .filter(|s| !s.is_empty())
+                    .collect::<Vec<_>>()
+                    .join(",");
                 Curve {
-                    id: setting.id().to_owned(),
+                    id: setting.id(),
                     settings: all,
                     label,
                     setting: setting.clone(),

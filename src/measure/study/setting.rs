@@ -1,7 +1,7 @@
 //! One setting of a study: an estimator with everything that is swept.
 
 use crate::estimate::Lookup;
-use crate::estimate::registry::estimator;
+use crate::estimate::registry::{estimator, short_name};
 use crate::render::plan::Slot;
 use crate::render::settings::{Gather, RenderSettings};
 use serde::{Deserialize, Serialize};
@@ -15,7 +15,7 @@ pub struct Setting {
     pub gather: Gather,
     /// Photons emitted per pass.
     pub photons: u64,
-    /// Photons looked up in each map, where the k nearest are.
+    /// Photons looked up in each map, where the k nearest are, or of a density estimate of final gathering.
     pub k: Option<usize>,
     /// Factor on the axes of photon footprints, where footprints are used.
     pub footprint_scale: Option<f32>,
@@ -29,7 +29,7 @@ impl Setting {
             estimator: estimator.name(),
             gather,
             photons: settings.photons,
-            k: (gather == Gather::Knn).then_some(settings.k),
+            k: (gather == Gather::Knn || estimator.final_gathering().is_some()).then_some(settings.k),
             footprint_scale: (estimator.lookup() != Lookup::Disc).then_some(settings.footprint_scale),
         }
     }
@@ -46,9 +46,9 @@ impl Setting {
         }
     }
 
-    /// Name of the estimator without its settings.
-    pub fn id(&self) -> &str {
-        self.estimator.split(':').next().unwrap_or(&self.estimator)
+    /// Name of the estimator without its settings, with the method of its final gathering.
+    pub fn id(&self) -> String {
+        short_name(&self.estimator)
     }
 
     /// Whether its progressive render tends to the truth: the estimator is consistent and sees all photons that overlap.
@@ -82,7 +82,7 @@ pub fn labels(settings: &[Setting]) -> Vec<String> {
         .iter()
         .map(|s| {
             let alone = !settings.iter().any(|o| o.id() == s.id() && o.estimator != s.estimator);
-            let mut label = if alone { s.id().to_owned() } else { s.estimator.clone() };
+            let mut label = if alone { s.id() } else { s.estimator.clone() };
             if gathers && s.footprint_scale.is_some() {
                 label.push_str(&format!(" {}", s.gather.name()));
             }

@@ -1,11 +1,13 @@
 //! Why a pixel has its value: its view rays, its photons, and their weights under each estimator.
 
+pub mod gathering;
 mod path;
 mod photon_path;
 mod situation;
 #[cfg(test)]
 mod tests;
 
+pub use gathering::{GatheredHit, Gathering, LayerInfo, RayEnd};
 pub use path::{PathVertex, SurfaceKind};
 pub use photon_path::{PhotonPath, PhotonVertex, photon_path};
 pub use situation::Situation;
@@ -21,7 +23,7 @@ use crate::render::renderer::slots;
 use crate::render::view::{ViewCounts, ViewTracer, seen_by};
 use crate::render::view_pass::{Scratch, ViewPass};
 use crate::render::watch::Silent;
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use path::PathRecorder;
 use std::collections::BTreeMap;
 
@@ -40,6 +42,8 @@ pub struct Inspection {
     pub path: Vec<PathVertex>,
     /// Photons that some estimator gathered, by hit, kind and index.
     pub rows: Vec<PhotonRow>,
+    /// What final gathering brought under each estimator that gathers finally.
+    pub gatherings: Vec<Gathering>,
 }
 
 /// The pixel under one estimator.
@@ -128,7 +132,7 @@ pub struct PhotonRow {
     pub weights: Vec<f64>,
     /// What it adds to the pixel under each estimator, W/(m² sr): weight, power and the hit's weight, over the rays.
     ///
-    /// With the base they add up to the value: no term is negative, so the sum is within `2⁻²¹` of it, relatively.
+    /// With the base, and what gather rays bring, they add up to the value: no term is negative, so the sum is within `2⁻²¹` of it, relatively.
     pub contributions: Vec<Rgb>,
     /// Points under each estimator at which the kernel is evaluated and not zero; 0 where it uses no points.
     pub samples: Vec<u32>,
@@ -173,7 +177,8 @@ pub fn inspect(pass: &Pass, estimators: &[Box<dyn Estimator>], pixel: [u32; 2]) 
     let rect = Rect { x: pixel[0], y: pixel[1], width: 1, height: 1 };
     let view = pass.view();
     let images: Vec<_> = view.run(rect, &slots, &Silent).tiles.into_iter().flat_map(|t| t.images).collect();
-    let mut account = Account { view: &view, slots: &slots, hits: Vec::new(), path: Vec::new(), rows: BTreeMap::new() };
+    let mut account = Account::new(&view, &slots);
+    account.gatherings = gathering::all(&view, &slots);
     let mut grids: Vec<u32> = std::iter::once(1).chain(slots.iter().map(|s| s.estimator.rays_per_axis())).collect();
     grids.sort_unstable();
     grids.dedup();
@@ -190,7 +195,8 @@ pub fn inspect(pass: &Pass, estimators: &[Box<dyn Estimator>], pixel: [u32; 2]) 
     });
     let estimators = values.collect();
     let rows = account.rows();
-    Ok(Inspection { pixel, pass: pass.number, estimators, hits: account.hits, path: account.path, rows })
+    let Account { hits, path, gatherings, .. } = account;
+    Ok(Inspection { pixel, pass: pass.number, estimators, hits, path, rows, gatherings })
 }
 
 /// The surfaces that the one ray of a pixel meets, with view footprints whether or not the pass needed them.
@@ -207,17 +213,23 @@ pub fn view_path(pass: &Pass, pixel: [u32; 2]) -> Result<Vec<PathVertex>, Inspec
     let plan = Plan { view_differentials: true, shadow_rays: false, ..pass.plan.clone() };
     let own = pass.view();
     let view = ViewPass { tracer: ViewTracer { plan: &plan, footprints: true, ..own.tracer }, ..own };
-    let mut account = Account { view: &view, slots: &[], hits: Vec::new(), path: Vec::new(), rows: BTreeMap::new() };
+    let mut account = Account::new(&view, &[]);
     account.add_rays(Rect { x: pixel[0], y: pixel[1], width: 1, height: 1 }, 1);
     Ok(account.path)
 }
 
 impl Inspection {
-    /// Base and contributions under one estimator, added up in f64.
+    /// Base, contributions of photons, and what gather rays bring under one estimator, added up in f64.
     pub fn sum(&self, estimator: usize) -> Rgb {
         let base = self.estimators.get(estimator).map_or(Rgb::ZERO, |e| e.base);
         let photons = self.rows.iter().filter_map(|r| r.contributions.get(estimator));
-        in_f32(photons.fold(base.as_dvec3(), |sum, c| sum + c.as_dvec3())).0
+        let sum = photons.fold(base.as_dvec3(), |sum, c| sum + c.as_dvec3());
+        in_f32(sum + self.gathering(estimator).map_or(DVec3::ZERO, Gathering::sum)).0
+    }
+
+    /// What final gathering brought under one estimator; None if it gathers nothing finally.
+    pub fn gathering(&self, estimator: usize) -> Option<&Gathering> {
+        self.gatherings.iter().find(|g| g.estimator == estimator)
     }
 }
 
@@ -240,9 +252,15 @@ struct Account<'a> {
     path: Vec<PathVertex>,
     /// Weights of each photon, by hit, kind and index.
     rows: BTreeMap<(usize, PhotonKind, u32), Vec<f64>>,
+    gatherings: Vec<Gathering>,
 }
 
-impl Account<'_> {
+impl<'a> Account<'a> {
+    fn new(view: &'a ViewPass<'a>, slots: &'a [Slot<'a>]) -> Self {
+        let (hits, path, rows, gatherings) = (Vec::new(), Vec::new(), BTreeMap::new(), Vec::new());
+        Self { view, slots, hits, path, rows, gatherings }
+    }
+
     /// Adds a grid of `n`×`n` rays with the photons of the slots that use it; returns the light that needs no photons.
     fn add_rays(&mut self, rect: Rect, n: u32) -> Rgb {
         let mut scratch = Scratch::default();
@@ -276,6 +294,9 @@ impl Account<'_> {
                     weights[e] = slot.estimator.weight(photon, &view_hit.view, gathered.radius);
                 }
             });
+            if let Some(gathering) = self.gatherings.iter_mut().find(|g| g.estimator == e) {
+                gathering.add(self.view, slot, &scratch.hits, first_hit, n * n);
+            }
         }
         in_f32(base.first().copied().unwrap_or_default() / f64::from(n * n)).0
     }

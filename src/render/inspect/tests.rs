@@ -5,6 +5,7 @@ use crate::estimate::registry::estimators;
 use crate::render::{RenderSettings, Renderer};
 use crate::scene::open;
 use crate::scene::scene_file::RenderFile;
+use std::f64::consts::PI;
 use std::sync::Arc;
 
 const ALL: &str = "density,regular,regular_3x3:n=2,coplanar,coplanar:weight=mean,multi_sampled:n=4,integrated";
@@ -117,6 +118,122 @@ fn parts_of_an_inspection_refer_to_each_other() {
     }
 }
 
+const GATHERED: &str = "integrated+classic:rays=20,regular_3x3:n=2+precomputed:rays=9,\
+    integrated+ray-differentials:rays=40,pattern=sobol,multi_sampled:n=2+ray-differentials:rays=30,near=0.5";
+
+/// Value: the bits of the image. Base, photons and gather rays: the value.
+#[test]
+fn gather_rays_add_up_to_the_pixel_of_the_image() {
+    let list = estimators(GATHERED).expect("registered");
+    let mut rays = [0; 4];
+    for (scene, number) in [("cornell", 0), ("glass_sphere", 0), ("two_lights", 2)] {
+        let pass = pass(scene, &by("overlap"), GATHERED, number);
+        let images = images(&pass, &list);
+        for i in (0..SIZE[0] * SIZE[1]).step_by(101) {
+            let pixel = [i % SIZE[0], i / SIZE[0]];
+            let found = inspect(&pass, &list, pixel).expect("inside");
+            for (e, of) in found.estimators.iter().enumerate() {
+                assert_eq!(of.value.to_array().map(f32::to_bits), images[e][i as usize].to_array().map(f32::to_bits));
+                let error = (found.sum(e) - of.value).abs();
+                assert!(error.cmple(of.value * 2f32.powi(-21)).all(), "{scene} {pixel:?} {}: {error}", of.name);
+                let g = found.gathering(e).expect("gathers finally");
+                let own = found.hits.iter().filter(|h| h.rays_per_axis == of.rays_per_axis).count();
+                assert_eq!(g.hits.len(), own);
+                for h in &g.hits {
+                    assert_eq!(h.rays.len(), g.settings.rays as usize);
+                    // The rays by themselves: the irradiance, and with the hit's weight the contribution.
+                    let sum: DVec3 = h.rays.iter().map(|r| r.contribution.as_dvec3()).sum();
+                    assert!((sum - h.irradiance.as_dvec3()).abs().max_element() <= 1e-5 * sum.max_element());
+                    let adds = sum * h.weight.as_dvec3();
+                    assert!((adds - h.contribution.as_dvec3()).abs().max_element() <= 1e-5 * adds.max_element());
+                    rays[e] += h.rays.len();
+                }
+                // Photons of the global map do not count here: no estimator looks into it.
+                assert!(found.rows.iter().all(|r| r.kind != PhotonKind::Global));
+            }
+        }
+    }
+    assert!(rays.iter().all(|n| *n > 500), "{rays:?}");
+}
+
+/// Each ray's irradiance from the estimates that it names, by a mean of their own; their discs are where the ray ends.
+#[test]
+fn gather_rays_name_the_estimates_that_they_average() {
+    let names = "integrated+ray-differentials:rays=60,regular+precomputed:rays=60,regular+classic:rays=60";
+    let list = estimators(names).expect("registered");
+    let pass = pass("cornell", &by("overlap"), names, 0);
+    let (mut averaged, mut nearest) = (0, 0);
+    for pixel in [[5, 20], [20, 30], [30, 9]] {
+        let found = inspect(&pass, &list, pixel).expect("inside");
+        for g in &found.gatherings {
+            let (mut named, mut recorded) = (0, 0);
+            for ray in g.hits.iter().flat_map(|h| &h.rays) {
+                recorded += 1;
+                let estimates: Vec<_> = ray
+                    .estimates
+                    .iter()
+                    .map(|at| gathering::estimate(&pass.gathering, &g.settings, *at).expect("there").1)
+                    .collect();
+                let Some(hit) = ray.hit else {
+                    assert!(estimates.is_empty() && ray.contribution == Rgb::ZERO && ray.missed.is_some());
+                    continue;
+                };
+                let end = RayEnd::of(ray);
+                assert_eq!(end == RayEnd::Photons, g.estimator == 2);
+                if estimates.is_empty() {
+                    assert!(matches!(end, RayEnd::Photons | RayEnd::Unknown));
+                    continue;
+                }
+                named += 1;
+                assert!(ray.estimates.iter().all(|(layer, _)| Some(*layer) == gathering::layer_of(ray)));
+                let area: f64 = estimates.iter().map(|e| f64::from(e.area)).sum();
+                let mean = estimates.iter().map(|e| e.irradiance.as_dvec3() * f64::from(e.area)).sum::<DVec3>() / area;
+                assert!((mean - ray.irradiance.as_dvec3()).abs().max_element() <= 1e-5 * mean.max_element());
+                let [long, short] = gathering::semi_axes(&hit, pass.scene.resolution());
+                assert!(long >= short && short > 0.0);
+                match end {
+                    RayEnd::Footprint => {
+                        averaged += 1;
+                        let inside = |p: Vec3| (p - hit.position).length() <= long * 1.000_1;
+                        assert!(estimates.iter().all(|e| inside(e.position)));
+                        let ellipse = PI * f64::from(hit.footprint[0].cross(hit.footprint[1]).length());
+                        assert!((ellipse / (PI * f64::from(long * short)) - 1.0).abs() < 1e-3);
+                    }
+                    _ => nearest += 1,
+                }
+            }
+            assert_eq!(g.ends().values().sum::<usize>(), recorded);
+            assert_eq!(g.rays_by_layer().iter().sum::<usize>(), named);
+            assert!(g.strongest().is_sorted_by(|a, b| g.adds(*a).element_sum() >= g.adds(*b).element_sum()));
+            assert_eq!(g.strongest().len(), recorded);
+        }
+    }
+    assert!(averaged > 50 && nearest > 50, "{averaged} {nearest}");
+}
+
+/// The discs of directions of all rays have the area that they own: seen along the normal `π r² cos θ`, together π.
+#[test]
+fn discs_of_directions_fill_the_hemisphere_seen_along_its_normal() {
+    let names = "integrated+ray-differentials:rays=400,integrated+classic:rays=5";
+    let list = estimators(names).expect("registered");
+    let pass = pass("cornell", &by("overlap"), names, 0);
+    let found = inspect(&pass, &list, [20, 30]).expect("inside");
+    let gathered = &found.gatherings[0].hits[0];
+    let normal = found.hits[gathered.hit].view.query.normal;
+    let mut area = 0.0;
+    for ray in &gathered.rays {
+        let disc = gathering::disc_of_directions(normal, ray, 64);
+        let next = disc.iter().cycle().skip(1);
+        let own: f32 = disc.iter().zip(next).map(|(a, b)| a.perp_dot(*b)).sum::<f32>() / 2.0;
+        assert!(own > 0.0 && disc.iter().all(|p| p.length() <= 1.0 + 1e-5));
+        area += f64::from(own);
+    }
+    // Beyond the rim there is nothing to fill, and discs are flat where the sphere is not.
+    assert!((area / PI - 1.0).abs() < 0.1, "{area}");
+    let point = gathering::disc_of_directions(normal, &found.gatherings[1].hits[0].rays[0], 64);
+    assert_eq!(point.len(), 1);
+}
+
 #[test]
 fn odd_requests_are_refused_in_one_line() {
     let pass = pass("ring", &by("overlap"), "regular", 0);
@@ -128,6 +245,12 @@ fn odd_requests_are_refused_in_one_line() {
     for (name, part) in [("density", "kd-tree"), ("integrated", "view differentials")] {
         let other = estimators(name).expect("registered");
         assert!(inspect(&pass, &other, [1, 1]).expect_err("not planned").to_string().contains(part));
+    }
+    let gathering = self::pass("cornell", &by("overlap"), "integrated+classic:rays=4", 0);
+    for (name, part) in [("integrated", "global map"), ("integrated+precomputed:rays=4", "its final gathering")] {
+        let other = estimators(name).expect("registered");
+        let error = inspect(&gathering, &other, [1, 1]).expect_err("not planned").to_string();
+        assert!(error.contains(part) && error.contains(name), "{error}");
     }
     // Nothing asked for: the view path alone.
     let path = inspect(&pass, &[], [20, 20]).expect("inside");

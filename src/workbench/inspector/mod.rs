@@ -1,13 +1,20 @@
 //! The inspector: why the pinned pixel has its value.
 
+pub mod hemisphere;
 pub mod plane;
+pub mod rays;
 pub mod summary;
 pub mod table;
 
 use crate::estimate::{Construction, Estimator, registry};
+use crate::export::false_color::{FalseColor, ValueRange};
+use crate::export::tone::color_map;
+use crate::math::rgb::mean;
 use crate::photons::PhotonKind;
 use crate::render::Pass;
-use crate::render::inspect::{Inspection, PhotonPath, inspect, photon_path};
+use crate::render::inspect::{Gathering, Inspection, PhotonPath, inspect, photon_path};
+use crate::workbench::overlays::photons::is_seen;
+use egui::Color32;
 use std::sync::Arc;
 
 /// A pixel taken apart, with what is drawn of it.
@@ -18,6 +25,19 @@ pub struct Inspected {
     pub inspection: Inspection,
     /// For each row and estimator: points and polygons; empty where the estimator uses none.
     pub constructions: Vec<Vec<Construction>>,
+    /// For each of the inspection's gatherings: its rays, the strongest first.
+    pub rays: Vec<Vec<ListedRay>>,
+}
+
+/// A gather ray in the list of all of them.
+#[derive(Clone, Copy, Debug)]
+pub struct ListedRay {
+    /// Which it is, for [`Gathering::ray`].
+    pub at: [usize; 2],
+    /// What it adds to the pixel's mean channel, W/(m² sr).
+    pub adds: f32,
+    /// Whether the camera sees the place where it ends.
+    pub seen: bool,
 }
 
 impl Inspected {
@@ -37,7 +57,53 @@ impl Inspected {
             }
         });
         let constructions = constructions.collect();
-        Ok(Self { pass: Arc::clone(pass), inspection, constructions })
+        let rays = inspection.gatherings.iter().map(|g| listed(pass, g)).collect();
+        Ok(Self { pass: Arc::clone(pass), inspection, constructions, rays })
+    }
+
+    /// The gathering of an estimator with the list of its rays.
+    pub fn gathering(&self, estimator: usize) -> Option<(&Gathering, &[ListedRay])> {
+        let at = self.inspection.gatherings.iter().position(|g| g.estimator == estimator)?;
+        Some((&self.inspection.gatherings[at], self.rays.get(at)?))
+    }
+
+    /// The gathering of an estimator at a hit: the entry of that hit, or else the first.
+    pub fn gathered_at(&self, estimator: usize, hit: usize) -> Option<usize> {
+        let (gathering, _) = self.gathering(estimator)?;
+        let own = gathering.hits.iter().position(|h| h.hit == hit);
+        own.or((!gathering.hits.is_empty()).then_some(0))
+    }
+}
+
+fn listed(pass: &Pass, gathering: &Gathering) -> Vec<ListedRay> {
+    let ray = |at: [usize; 2]| {
+        let end = gathering.ray(at).and_then(|r| r.hit);
+        let seen = end.is_some_and(|h| is_seen(pass, h.position, h.normal));
+        ListedRay { at, adds: mean(gathering.adds(at)), seen }
+    };
+    gathering.strongest().into_iter().map(ray).collect()
+}
+
+/// Colours of what rays bring: logarithmic, from a thousandth of the strongest up.
+pub struct RayColors {
+    scale: FalseColor,
+    most: f32,
+}
+
+impl RayColors {
+    /// Of the rays of a list, by the colour map of that name.
+    pub fn new(rays: &[ListedRay], map: Option<&str>) -> Self {
+        let scale = FalseColor::new(color_map(map), ValueRange { low: -3.0, high: 0.0 });
+        Self { scale, most: rays.first().map_or(0.0, |r| r.adds) }
+    }
+
+    /// That of a ray which adds so much; grey for nothing.
+    pub fn of(&self, adds: f32) -> Color32 {
+        if !(adds > 0.0 && self.most > 0.0) {
+            return Color32::from_gray(70);
+        }
+        let [r, g, b] = self.scale.color(libm::log10f(adds / self.most));
+        Color32::from_rgb(r, g, b)
     }
 }
 
@@ -99,6 +165,16 @@ pub struct Inspector {
     pub zoom: f32,
     /// Path of the photon that was clicked.
     pub path: Option<FoundPath>,
+    /// Whether gather rays are shown in place of photons, under an estimator that gathers finally.
+    pub shows_rays: bool,
+    /// Gather ray under the pointer in this frame, by its place in the list.
+    pub hovered_ray: Option<usize>,
+    /// Gather ray under the pointer in the frame before.
+    pub lit_ray: Option<usize>,
+    /// Gather ray that was clicked.
+    pub chosen_ray: Option<usize>,
+    /// Gather ray to be chosen when the next pixel is found, under the first estimator that gathers finally.
+    pub wanted_ray: Option<usize>,
 }
 
 impl Default for Inspector {
@@ -116,6 +192,11 @@ impl Default for Inspector {
             chosen: None,
             zoom: 1.0,
             path: None,
+            shows_rays: true,
+            hovered_ray: None,
+            lit_ray: None,
+            chosen_ray: None,
+            wanted_ray: None,
         }
     }
 }
@@ -128,6 +209,7 @@ impl Inspector {
             self.hit = 0;
             self.chosen = None;
             self.path = None;
+            self.chosen_ray = None;
         }
         // The hit that says most of the pixel comes first.
         let hits = &found.inspection.hits;
@@ -136,8 +218,14 @@ impl Inspector {
         if self.chosen.is_some_and(|c| c >= found.inspection.rows.len()) {
             self.chosen = None;
         }
+        if let (Some(rank), Some(g)) = (self.wanted_ray, found.inspection.gatherings.first()) {
+            (self.estimator, self.chosen_ray, self.wanted_ray) = (g.estimator, Some(rank), None);
+        }
+        let rays = found.gathering(self.estimator).map_or(0, |(_, rays)| rays.len());
+        self.chosen_ray = self.chosen_ray.filter(|r| *r < rays);
         self.lit = None;
         self.hovered = None;
+        (self.lit_ray, self.hovered_ray) = (None, None);
         self.found = Some(Arc::new(found));
     }
 
@@ -148,6 +236,7 @@ impl Inspector {
             zoom: self.zoom,
             sort: self.sort,
             descending: self.descending,
+            shows_rays: self.shows_rays,
             ..Self::default()
         };
     }
@@ -155,10 +244,16 @@ impl Inspector {
     /// Begins a frame.
     pub fn begin(&mut self) {
         self.lit = self.hovered.take();
+        self.lit_ray = self.hovered_ray.take();
     }
 
     /// The row that is drawn bright: under the pointer, or else clicked.
     pub fn bright(&self) -> Option<usize> {
         self.lit.or(self.chosen)
+    }
+
+    /// The gather ray that is drawn bright, by its place in the list.
+    pub fn bright_ray(&self) -> Option<usize> {
+        self.lit_ray.or(self.chosen_ray)
     }
 }

@@ -2,6 +2,7 @@
 
 use super::summary::situation_tip;
 use super::{Column, Inspected, Inspector};
+use crate::estimate::registry::short_name;
 use crate::math::rgb::mean;
 use crate::render::inspect::PhotonRow;
 use crate::workbench::theme::{mono, number};
@@ -44,7 +45,7 @@ pub fn show(ui: &mut Ui, inspector: &mut Inspector, found: &Inspected, colors: &
         (Column::Situation, "fig".into(), 30.0, "situation of figure 10 of the thesis: a, b or c"),
     ];
     for (e, estimator) in i.estimators.iter().enumerate() {
-        let id = estimator.name.split(':').next().unwrap_or("").to_owned();
+        let id = short_name(&estimator.name);
         // Weights are what one looks for, so they come right after the photon.
         columns.insert(1 + e, (Column::Weight(e), id, 60.0, "weight under this estimator, 1/m²"));
     }

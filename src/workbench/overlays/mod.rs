@@ -1,5 +1,6 @@
 //! Drawings on top of the images, each with its key and legend.
 
+pub mod estimates;
 pub mod photons;
 
 use egui::Key;
@@ -48,5 +49,17 @@ pub const ALL: &[Entry] = &[
         title: "View path",
         legend: "the view ray of the pinned pixel, from surface to surface",
         key: Key::R,
+    },
+    Entry {
+        id: "gather_rays",
+        title: "Gather rays",
+        legend: "where the gather rays of the pinned pixel end: their footprints, coloured by what they bring",
+        key: Key::H,
+    },
+    Entry {
+        id: "irradiance",
+        title: "Irradiance estimates",
+        legend: "a layer of the irradiance pyramid: its discs, and the part that each stands for, coloured by irradiance",
+        key: Key::I,
     },
 ];

@@ -42,21 +42,19 @@ impl VisiblePhotons {
         }
         chosen.sort_unstable_by_key(|c| c.0);
         let brightest = chosen.iter().map(|c| mean(c.2.power)).fold(0.0, f32::max);
-        let photons = chosen.into_iter().take(MOST).filter(|c| is_seen(pass, c.2)).map(|(_, kind, p)| VisiblePhoton {
-            kind,
-            position: p.position,
-            axes: p.axes(),
-            color: color(p.power, brightest),
-        });
+        let photons =
+            chosen.into_iter().take(MOST).filter(|c| is_seen(pass, c.2.position, c.2.normal)).map(|(_, kind, p)| {
+                VisiblePhoton { kind, position: p.position, axes: p.axes(), color: color(p.power, brightest) }
+            });
         Self { photons: photons.collect() }
     }
 }
 
-/// Whether nothing stands between the camera and the photon, and its surface faces the camera.
-fn is_seen(pass: &Pass, photon: &MapPhoton) -> bool {
-    let to = photon.position - pass.scene.camera.position;
+/// Whether nothing stands between the camera and a place of a surface of unit `normal`, which faces the camera.
+pub fn is_seen(pass: &Pass, position: Vec3, normal: Vec3) -> bool {
+    let to = position - pass.scene.camera.position;
     let distance = to.length();
-    if to.dot(photon.normal) >= 0.0 || distance <= 0.0 {
+    if to.dot(normal) >= 0.0 || distance <= 0.0 {
         return false;
     }
     let ray = Ray { origin: pass.scene.camera.position, direction: to / distance };

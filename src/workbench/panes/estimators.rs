@@ -1,7 +1,8 @@
 //! The estimators of the panels with their settings.
 
-use super::Panes;
 use super::widgets::{choice, integer, name, rows, swatch};
+use super::{Panes, final_gathering};
+use crate::estimate::FinalGathering;
 use crate::estimate::registry::{self, ESTIMATORS};
 use crate::estimate::settings::Spec;
 use crate::render::heatmap::Heatmap;
@@ -11,6 +12,7 @@ use crate::workbench::views::heatmap_of;
 use egui::Ui;
 
 pub(super) fn show(panes: &mut Panes, ui: &mut Ui) {
+    let radius = f64::from(panes.document.scene().radius);
     let names: Vec<String> = panes.document.session.panels.iter().map(|p| p.estimator.clone()).collect();
     let names: Vec<&str> = names.iter().map(String::as_str).collect();
     for index in 0..panes.document.session.panels.len() {
@@ -30,8 +32,14 @@ pub(super) fn show(panes: &mut Panes, ui: &mut Ui) {
             if close {
                 panes.desk.ask(Action::RemovePanel(index));
             }
-            if let Some(changed) = edit(ui, &panel.estimator) {
-                panel.estimator = changed;
+            let (own, gathering) = split(&panel.estimator);
+            let own = edit(ui, own).unwrap_or_else(|| own.to_owned());
+            let gathering = final_gathering::edit(ui, gathering, radius).unwrap_or(gathering);
+            let name = gathering.map_or(own.clone(), |f| format!("{own}+{f}"));
+            // Only what has changed is written: a name keeps the form in which it was given.
+            let meant = |text: &str| registry::estimator(text).ok().map(|e| e.name());
+            if let Some(name) = meant(&name).filter(|n| Some(n) != meant(&panel.estimator).as_ref()) {
+                panel.estimator = name;
             }
             rows(ui, "shows", |ui| {
                 let titles: Vec<&str> = std::iter::once("radiance").chain(Heatmap::ALL.map(Heatmap::title)).collect();
@@ -41,6 +49,11 @@ pub(super) fn show(panes: &mut Panes, ui: &mut Ui) {
                     panel.heatmap = Heatmap::ALL.iter().find(|h| h.title() == shown).map(|h| h.id().to_owned());
                 }
             });
+            if let Some(note) =
+                heatmap_of(panel).filter(|_| gathering.is_some()).and_then(Heatmap::with_final_gathering)
+            {
+                ui.weak(note);
+            }
         });
         ui.separator();
     }
@@ -53,6 +66,14 @@ pub(super) fn show(panes: &mut Panes, ui: &mut Ui) {
         }
     });
     add.response.on_hover_text("another estimator on the same photons");
+}
+
+/// The estimator itself, and its final gathering.
+fn split(text: &str) -> (&str, Option<FinalGathering>) {
+    match text.split_once('+') {
+        Some((own, gathering)) => (own, FinalGathering::parse(gathering).ok().flatten()),
+        None => (text, None),
+    }
 }
 
 /// Widgets for one estimator; its new text if it was changed.

@@ -3,6 +3,8 @@
 mod camera;
 mod display;
 mod estimators;
+mod final_gathering;
+mod gather_overlay;
 mod image;
 mod inspector;
 mod messages;

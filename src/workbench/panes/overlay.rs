@@ -1,6 +1,6 @@
 //! Overlays drawn into an image panel.
 
-use super::Panes;
+use super::{Panes, gather_overlay};
 use crate::photons::PhotonKind;
 use crate::render::inspect::view_path;
 use crate::workbench::inspector::plane::{corners, ellipse_points, kind_color};
@@ -20,13 +20,13 @@ const ELLIPSES: usize = 250;
 const LABELLED: f32 = 44.0;
 
 /// World points as they are seen in a panel.
-struct Projection<'a> {
-    panes: &'a Panes<'a>,
-    viewport: &'a Viewport,
+pub(super) struct Projection<'a> {
+    pub panes: &'a Panes<'a>,
+    pub viewport: &'a Viewport,
 }
 
 impl Projection<'_> {
-    fn at(&self, point: Vec3) -> Option<Pos2> {
+    pub fn at(&self, point: Vec3) -> Option<Pos2> {
         let size = self.panes.document.settings().size;
         let [x, y] = self.panes.document.scene().camera.project(point, size)?;
         // What lies far outside would only cost time.
@@ -37,7 +37,7 @@ impl Projection<'_> {
         points.iter().map(|p| self.at(*p)).collect()
     }
 
-    fn ellipse(&self, center: Vec3, axes: [Vec3; 2]) -> Option<Vec<Pos2>> {
+    pub fn ellipse(&self, center: Vec3, axes: [Vec3; 2]) -> Option<Vec<Pos2>> {
         ellipse_points(center, axes, SIDES).map(|p| self.at(p)).collect()
     }
 }
@@ -48,6 +48,9 @@ pub(super) fn draw(panes: &Panes, painter: &Painter, index: usize, viewport: &Vi
     let projection = Projection { panes, viewport };
     if on("tiles") {
         tiles(panes, painter, index, viewport);
+    }
+    if on("irradiance") {
+        gather_overlay::estimates(&projection, painter);
     }
     if on("photons") {
         photons(&projection, painter);
@@ -64,7 +67,11 @@ pub(super) fn draw(panes: &Panes, painter: &Painter, index: usize, viewport: &Vi
     if on("path") {
         path(&projection, painter);
     }
+    if on("gather_rays") {
+        gather_overlay::rays(&projection, painter);
+    }
     bright(&projection, painter);
+    gather_overlay::bright(&projection, painter);
 }
 
 /// The view footprint of the pixel under the pointer; dashed where it is seen by way of a specular surface.

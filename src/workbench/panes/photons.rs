@@ -1,7 +1,7 @@
 //! Photons and how they are gathered.
 
 use super::Panes;
-use super::widgets::{choice, integer, name as name_widget, real, rows};
+use super::widgets::{Limit, choice, integer, limit, real, rows};
 use egui::Ui;
 
 /// Most photons that a slider offers; the field takes more.
@@ -99,37 +99,6 @@ pub(super) fn show(panes: &mut Panes, ui: &mut Ui) {
             session.seed = seed as u64;
         }
     });
-}
-
-/// How a limit is shown.
-struct Limit {
-    tip: &'static str,
-    /// Its value when it is switched on.
-    first: f64,
-    /// From the value to what is shown.
-    factor: f64,
-    unit: &'static str,
-}
-
-/// A limit that can be off.
-fn limit(ui: &mut Ui, label: &str, value: &mut Option<f64>, Limit { tip, first, factor, unit }: Limit) {
-    let title = ui.label(label).on_hover_text(tip);
-    ui.horizontal(|ui| {
-        let mut on = value.is_some();
-        if ui.checkbox(&mut on, "").labelled_by(title.id).on_hover_text(tip).changed() {
-            *value = on.then_some(first);
-        }
-        let Some(value) = value else { return };
-        let mut shown = *value * factor;
-        let speed = shown * 0.01;
-        let drag = egui::DragValue::new(&mut shown).speed(speed).range(1e-3..=1e6).suffix(unit);
-        let response = ui.add(drag).on_hover_text(tip);
-        name_widget(&response, &format!("{label}, limit"));
-        if response.changed() {
-            *value = shown / factor;
-        }
-    });
-    ui.end_row();
 }
 
 /// Names of settings as the scene file writes them.

@@ -1,6 +1,7 @@
 //! Plots: error against run time, time by phase, footprint areas.
 
 use super::Panes;
+use crate::estimate::registry::short_name;
 use crate::workbench::desk::Desk;
 use crate::workbench::theme::{self, number, seconds};
 use egui::{Color32, Ui};
@@ -31,10 +32,10 @@ fn legend(corner: Corner) -> Legend {
 }
 
 /// An estimator without its settings, if no other panel has the same.
-fn short<'a>(names: &[&'a str], name: &'a str) -> &'a str {
-    let id = |n: &'a str| n.split(':').next().unwrap_or(n);
-    let alike = names.iter().filter(|n| **n != name && id(n) == id(name)).count();
-    if alike == 0 { id(name) } else { name }
+fn short(names: &[&str], name: &str) -> String {
+    let own = short_name(name);
+    let alike = names.iter().any(|n| *n != name && short_name(n) == own);
+    if alike { name.to_owned() } else { own }
 }
 
 /// log10 of a positive number; anything else has no place in a plot.
@@ -56,7 +57,7 @@ fn error_curves(desk: &Desk, names: &[&str]) -> Vec<Curve> {
     let measured = distinct().filter_map(|(panel, name)| {
         let points = desk.errors.get(*name)?.iter();
         let points = points.filter_map(|p| Some([log10(p.seconds)?, log10(p.error.relative_rmse)?])).collect();
-        Some(Curve { title: short(names, name).to_owned(), panel, points, estimated: false })
+        Some(Curve { title: short(names, name), panel, points, estimated: false })
     });
     let estimated = distinct().filter_map(|(panel, name)| {
         let points = desk.estimates.get(*name)?.iter();
@@ -116,8 +117,8 @@ pub(super) fn errors(panes: &mut Panes, ui: &mut Ui) {
 }
 
 /// Phases of the stacked bars with their colours: greys, since colours are the estimators'.
-const PHASES: [(&str, u8); 5] =
-    [("photons", 70), ("maps", 105), ("view rays", 140), ("gather", 180), ("estimate", 225)];
+const PHASES: [(&str, u8); 6] =
+    [("photons", 60), ("maps", 95), ("view rays", 130), ("gather", 165), ("estimate", 205), ("final gathering", 245)];
 
 pub(super) fn times(panes: &mut Panes, ui: &mut Ui) {
     ui.strong("Time by phase").on_hover_text("wall seconds of one pass: what the panel would cost alone");
@@ -137,7 +138,8 @@ pub(super) fn times(panes: &mut Panes, ui: &mut Ui) {
         };
         let traced = progress.seconds.photon_trace;
         let both = (traced + progress.seconds.map_build).max(f64::MIN_POSITIVE);
-        let parts = [shared * traced / both, shared * (1.0 - traced / both), own.view_trace, own.gather, own.estimate];
+        let photons = shared * traced / both;
+        let parts = [photons, shared - photons, own.view_trace, own.gather, own.estimate, own.final_gather];
         for ((stack, part), (_, grey)) in stacks.iter_mut().zip(parts).zip(&PHASES) {
             let shade = Color32::from_gray(*grey);
             let bar = Bar::new(i as f64, part / passes * 1e3).width(0.7).fill(shade);
@@ -145,7 +147,7 @@ pub(super) fn times(panes: &mut Panes, ui: &mut Ui) {
         }
     }
     let names: Vec<&str> = job.estimators.iter().map(String::as_str).collect();
-    let names: Vec<String> = names.iter().map(|n| short(&names, n).to_owned()).collect();
+    let names: Vec<String> = names.iter().map(|n| short(&names, n)).collect();
     let count = names.len();
     plot("times")
         .legend(legend(Corner::RightTop))

@@ -39,6 +39,39 @@ pub fn real(ui: &mut Ui, label: &str, tip: &str, value: &mut f64, range: RangeIn
     row(ui, label, tip, |ui| ui.add(slider)).changed()
 }
 
+/// How a limit is shown.
+pub struct Limit {
+    /// Tooltip.
+    pub tip: &'static str,
+    /// Its value when it is switched on.
+    pub first: f64,
+    /// From the value to what is shown.
+    pub factor: f64,
+    /// Unit behind it.
+    pub unit: &'static str,
+}
+
+/// A limit that can be off.
+pub fn limit(ui: &mut Ui, label: &str, value: &mut Option<f64>, Limit { tip, first, factor, unit }: Limit) {
+    let title = ui.label(label).on_hover_text(tip);
+    ui.horizontal(|ui| {
+        let mut on = value.is_some();
+        if ui.checkbox(&mut on, "").labelled_by(title.id).on_hover_text(tip).changed() {
+            *value = on.then_some(first);
+        }
+        let Some(value) = value else { return };
+        let mut shown = *value * factor;
+        let speed = shown * 0.01;
+        let drag = DragValue::new(&mut shown).speed(speed).range(1e-3..=1e6).suffix(unit);
+        let response = ui.add(drag).on_hover_text(tip);
+        name(&response, &format!("{label}, limit"));
+        if response.changed() {
+            *value = shown / factor;
+        }
+    });
+    ui.end_row();
+}
+
 /// Three numbers side by side.
 pub fn vector(
     ui: &mut Ui,

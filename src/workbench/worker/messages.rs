@@ -1,5 +1,6 @@
 //! What the window asks of the worker, and what the worker tells the window.
 
+use crate::final_gather::GatherCounts;
 use crate::math::rgb::Rgb;
 use crate::render::film::Rect;
 use crate::render::pass::Pass;
@@ -115,6 +116,8 @@ pub struct Progress {
     pub emitted: u64,
     /// Photons stored in all passes.
     pub stored: StoredCounts,
+    /// Rays of final gathering in all passes, and how they ended.
+    pub gather_counts: GatherCounts,
     /// What was bounded.
     pub bounded: Bounded,
     /// What was odd.

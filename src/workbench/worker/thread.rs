@@ -168,6 +168,7 @@ fn progress(r: &Renderer, estimates: Vec<Option<ErrorEstimate>>) -> Progress {
         estimates,
         emitted: r.emitted(),
         stored: r.stored(),
+        gather_counts: *r.gather_counts(),
         bounded: *r.bounded(),
         warnings: r.warnings(),
     }
