@@ -167,7 +167,7 @@ fn items_are_listed() {
     assert!(out.status.success());
     let json: Value = serde_json::from_slice(&cusp(&["paper", "--json"]).stdout).expect("JSON");
     let items = json["items"].as_array().expect("items");
-    assert_eq!(items.len(), 6);
+    assert_eq!(items.len(), 12);
     for item in items {
         assert!(text(&out.stdout).contains(item["item"].as_str().expect("a name")));
     }
@@ -196,15 +196,17 @@ fn wrong_calls_are_refused_in_one_line() {
 /// No photon at all, and an image of one pixel, are odd but defined.
 #[test]
 fn empty_and_tiny_cases_are_defined() {
-    for (size, photons) in [("24x24", "1"), ("1x1", "20000")] {
+    for (size, photons) in [("4x4", "1"), ("1x1", "20000")] {
         let folder = tempfile::tempdir().expect("a folder");
         let out = folder.path().to_str().expect("a plain path");
         let args = ["paper", "all", "--size", size, "--photons", photons, "--repeats", "1", "--out", out, "--json"];
-        let run = cusp(&args);
+        // References are kept beside the files.
+        let run = Command::new(env!("CARGO_BIN_EXE_cusp")).args(args).env("CUSP_CACHE", out).output().expect("runs");
         assert!(run.status.success(), "{args:?}: {}", text(&run.stderr));
         let json: Value = serde_json::from_slice(&run.stdout).expect("JSON");
-        assert_eq!(json["items"].as_array().map(Vec::len), Some(6));
-        for name in ["figure-15", "figure-16", "figure-17", "figure-18", "table-1", "figure-19"] {
+        let items = json["items"].as_array().expect("items");
+        assert_eq!(items.len(), 12);
+        for name in items.iter().map(|i| i["item"].as_str().expect("a name")) {
             for end in ["png", "csv", "json"] {
                 assert!(folder.path().join(format!("{name}.{end}")).exists(), "{name}.{end}");
             }

@@ -83,8 +83,6 @@ pub struct FinalGathering {
     pub radius: Option<f32>,
     /// Ratio of radii from layer to layer, above 1.
     pub growth: f32,
-    /// Whether the two layers nearest to a footprint's size are blended, in place of a jump from one to the next.
-    pub blend: bool,
     /// Distance (metres) below which a ray that has met a surface gathers a second time from there; 0 for never.
     pub near: f32,
 }
@@ -95,8 +93,7 @@ pub const MAX_RAYS: u32 = 1 << 16;
 pub const DEFAULT_RAYS: u32 = 200;
 
 /// Keys of its settings, as the command line's `--sweep` knows them too.
-pub const KEYS: [&str; 9] =
-    ["rays", "pattern", "differentials", "estimates", "reach", "radius", "growth", "blend", "near"];
+pub const KEYS: [&str; 8] = ["rays", "pattern", "differentials", "estimates", "reach", "radius", "growth", "near"];
 
 impl FinalGathering {
     /// That method with its default settings.
@@ -110,7 +107,6 @@ impl FinalGathering {
             reach: FootprintReach::Surface,
             radius: None,
             growth: 2.0,
-            blend: false,
             near: 0.0,
         }
     }
@@ -152,7 +148,6 @@ impl FinalGathering {
                 _ => number("radius", 0.0, 1e30, "auto or a length in metres above 0")?,
             },
             growth: number("growth", 1.05, 16.0, "above 1.05 and at most 16")?.unwrap_or(default.growth),
-            blend: spec.choice("blend", false, &[("off", false), ("on", true)])?,
             near: match spec.get("near") {
                 Some("0") => 0.0,
                 _ => number("near", 0.0, 1e30, "a length in metres")?.unwrap_or(0.0),
@@ -185,9 +180,6 @@ impl fmt::Display for FinalGathering {
         }
         if self.growth != default.growth {
             write!(f, ",growth={}", self.growth)?;
-        }
-        if self.blend {
-            f.write_str(",blend=on")?;
         }
         if self.near > 0.0 {
             write!(f, ",near={}", self.near)?;
@@ -278,7 +270,7 @@ mod tests {
             "classic:rays=200",
             "precomputed:rays=1,radius=0.05",
             "ray-differentials:rays=800,pattern=stratified,differentials=as_published,estimates=as_published,reach=facing",
-            "ray-differentials:rays=65536,pattern=sobol,growth=1.5,blend=on,near=0.25",
+            "ray-differentials:rays=65536,pattern=sobol,growth=1.5,near=0.25",
         ] {
             let parsed = FinalGathering::parse(text).expect("valid").expect("some");
             assert_eq!(parsed.to_string(), text);

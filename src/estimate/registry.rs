@@ -270,13 +270,13 @@ mod tests {
     #[test]
     fn final_gathering_goes_with_each_estimator() {
         let list = estimators("integrated,multi_sampled:n=2,grid=cells+classic:rays=8,pattern=sobol").expect("parses");
-        let all = final_gatherings("none,ray-differentials:rays=9,blend=on").expect("parses");
+        let all = final_gatherings("none,ray-differentials:rays=9,growth=3").expect("parses");
         let names: Vec<_> = with_final_gathering(&list, &all).expect("valid").iter().map(|e| e.name()).collect();
         assert_eq!(
             names,
             [
                 "integrated",
-                "integrated+ray-differentials:rays=9,blend=on",
+                "integrated+ray-differentials:rays=9,growth=3",
                 "multi_sampled:n=2,grid=cells+classic:rays=8,pattern=sobol"
             ]
         );

@@ -56,8 +56,16 @@ pub const PALETTE: [[u8; 3]; 8] = [
     [200, 200, 200],
 ];
 
-/// Draws a sheet.
+/// What errors are against unless [`draw_against`] says otherwise.
+const TRUTH: &str = "regular with 16×16 view rays on the same photons";
+
+/// Draws a sheet whose errors are against `regular` with 16×16 view rays.
 pub fn draw(sheet: &Sheet) -> Canvas {
+    draw_against(sheet, TRUTH)
+}
+
+/// Draws a sheet; `truth` says what its errors are against.
+pub fn draw_against(sheet: &Sheet, truth: &str) -> Canvas {
     let inner = sheet.crop.width * sheet.enlarge;
     let crop_height = sheet.crop.height * sheet.enlarge;
     let [w, h] = sheet.columns.first().map_or([1, 1], |c| c.image.size);
@@ -99,7 +107,8 @@ pub fn draw(sheet: &Sheet) -> Canvas {
             canvas.paste(x, y, error.size, &signed_colors(error), sheet.enlarge);
         }
     }
-    let error = "error against regular with 16×16 view rays on the same photons, orange too bright, blue too dark, full at ± the truth's mean";
+    let error =
+        format!("error against {truth}, orange too bright, blue too dark, full at ± the mean of what it is against");
     let note = match (overview, has_error) {
         (true, true) => format!("above: the framed part, enlarged without smoothing; below: its {error}"),
         (true, false) => "below each image: the framed part, enlarged without smoothing".into(),

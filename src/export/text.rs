@@ -97,7 +97,8 @@ impl Canvas {
         }
     }
 
-    fn blend(&mut self, x: u32, y: u32, color: [u8; 3], coverage: f32) {
+    /// Lays a colour over a pixel, which must be inside, as far as it covers it, 0 to 1.
+    pub fn blend(&mut self, x: u32, y: u32, color: [u8; 3], coverage: f32) {
         let at = self.place(x, y);
         let c = coverage.clamp(0.0, 1.0);
         for (under, over) in self.rgb[at..at + 3].iter_mut().zip(color) {

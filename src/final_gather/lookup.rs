@@ -29,7 +29,7 @@ pub enum Used {
     Photons,
     /// The estimate nearest to the hit: the footprint is below the first layer, or none was asked for.
     Nearest,
-    /// Estimates inside the footprint, of the layer of that index; with blending also of the next.
+    /// Estimates inside the footprint, of the layer of that index.
     Footprint(usize),
     /// The estimate nearest to the hit in the layer of that index, because the footprint held none.
     NearestOf(usize),
@@ -90,41 +90,23 @@ fn footprint(
     visit: &mut impl FnMut(usize, u32),
 ) -> (DVec3, Used) {
     let ellipse = Ellipse::new(hit.position, hit.footprint, hit.normal, floor);
-    let mut mean = |layer: usize| {
-        let mut mean = WeightedMean::default();
-        if let Some(l) = pyramid.layers().get(layer) {
-            l.in_ellipse(&ellipse, |i, e| {
-                if counts(f.reach, hit, e) {
-                    mean.add(e);
-                    visit(layer, i);
-                }
-            });
-        }
-        mean.value().map(|m| m.as_dvec3())
+    let Some(layer) = pyramid.layer_for(ellipse.longest()) else {
+        return nearest(pyramid, 0, f.reach, hit, visit)
+            .map_or((DVec3::ZERO, Used::None), |irradiance| (irradiance, Used::Nearest));
     };
-    let layer = if f.blend {
-        let Some(position) = pyramid.position_for(ellipse.longest()) else {
-            return nearest(pyramid, 0, f.reach, hit, visit)
-                .map_or((DVec3::ZERO, Used::None), |irradiance| (irradiance, Used::Nearest));
-        };
-        let layer = position as usize;
-        let share = f64::from(position - layer as f32);
-        match (mean(layer), if share > 0.0 { mean(layer + 1) } else { None }) {
-            (Some(fine), Some(coarse)) => return (fine.lerp(coarse, share), Used::Footprint(layer)),
-            (Some(one), None) | (None, Some(one)) => return (one, Used::Footprint(layer)),
-            (None, None) => layer,
-        }
-    } else {
-        let Some(layer) = pyramid.layer_for(ellipse.longest()) else {
-            return nearest(pyramid, 0, f.reach, hit, visit)
-                .map_or((DVec3::ZERO, Used::None), |irradiance| (irradiance, Used::Nearest));
-        };
-        if let Some(irradiance) = mean(layer) {
-            return (irradiance, Used::Footprint(layer));
-        }
-        layer
-    };
-    // A needle of a footprint may slip between the estimates.
-    nearest(pyramid, layer, f.reach, hit, visit)
-        .map_or((DVec3::ZERO, Used::None), |irradiance| (irradiance, Used::NearestOf(layer)))
+    let mut mean = WeightedMean::default();
+    if let Some(l) = pyramid.layers().get(layer) {
+        l.in_ellipse(&ellipse, |i, e| {
+            if counts(f.reach, hit, e) {
+                mean.add(e);
+                visit(layer, i);
+            }
+        });
+    }
+    match mean.value() {
+        Some(irradiance) => (irradiance.as_dvec3(), Used::Footprint(layer)),
+        // A needle of a footprint may slip between the estimates.
+        None => nearest(pyramid, layer, f.reach, hit, visit)
+            .map_or((DVec3::ZERO, Used::None), |irradiance| (irradiance, Used::NearestOf(layer))),
+    }
 }

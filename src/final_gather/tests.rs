@@ -12,7 +12,7 @@ use crate::scene::{Material, Scene, open};
 use crate::trace::{Differential, Intersector, Ray};
 use glam::{DVec3, Vec3};
 
-const METHODS: &str = "classic:rays=400,ray-differentials:rays=400,ray-differentials:rays=400,blend=on,precomputed:rays=400,\
+const METHODS: &str = "classic:rays=400,ray-differentials:rays=400,precomputed:rays=400,\
                        ray-differentials:rays=400,reach=facing,pattern=sobol";
 
 fn settings(text: &str) -> Vec<FinalGathering> {

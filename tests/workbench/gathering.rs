@@ -82,7 +82,7 @@ fn gather_rays_are_listed_by_what_they_add() {
 #[test]
 fn sessions_keep_final_gathering() {
     let folder = tempfile::tempdir().expect("a folder");
-    let name = "multi_sampled:n=2,grid=cells+ray-differentials:rays=6,pattern=sobol,blend=on";
+    let name = "multi_sampled:n=2,grid=cells+ray-differentials:rays=6,pattern=sobol,growth=3";
     let session = room(name);
     let path = folder.path().join("gathered.toml");
     std::fs::write(&path, session.to_toml(folder.path()).expect("a text")).expect("writes");

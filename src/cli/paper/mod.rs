@@ -1,4 +1,4 @@
-//! `cusp paper`: figures and tables of the thesis, reproduced.
+//! `cusp paper`: figures and tables of the papers, reproduced.
 
 mod bars;
 mod figure_15;
@@ -6,6 +6,7 @@ mod figure_16;
 mod figure_17;
 mod figure_18;
 mod figure_19;
+mod gathering;
 mod methods;
 mod output;
 mod picture;
@@ -37,22 +38,22 @@ pub struct PaperArgs {
     flags: PaperFlags,
 }
 
-/// The common flags that mean something here: they override the thesis's own settings.
+/// The common flags that mean something here: they override the settings of an item.
 #[derive(Clone, Debug, Default, Args)]
 pub struct PaperFlags {
-    /// Size of the image in pixels; 512x512 if left out
+    /// Size of the image in pixels; if left out 512x512 for the thesis, 64x64 for gather-table, 96x96 for its figures 4 and 5
     #[arg(long, value_name = "WxH", value_parser = size)]
     size: Option<[u32; 2]>,
-    /// Photons emitted; 446300 if left out, which store the published 4978 caustic ones
+    /// Photons emitted; if left out 446300 for the thesis, which store the published 4978 caustic ones, 1e6 for gather-table
     #[arg(long, value_name = "N", value_parser = count, allow_negative_numbers = true)]
     photons: Option<i64>,
     /// Factor on the axes of all photon footprints; 8.86 if left out: the published size times the listing's smoothing
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     footprint_scale: Option<f64>,
-    /// Photons that the published gather looks up; the published 50 if left out
+    /// Photons of a density estimate; the published 50 if left out
     #[arg(long, value_name = "K", value_parser = count, allow_negative_numbers = true)]
     k: Option<i64>,
-    /// Repeats of what is timed (table-1 and figure-19); 5 if left out
+    /// Repeats of what is timed; if left out 5 for table-1 and figure-19, 1 for gather-table
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
     repeats: Option<u32>,
     /// Seed of everything random; 1 if left out
@@ -110,6 +111,18 @@ enum ItemName {
     Table1,
     #[value(name = "figure-19")]
     Figure19,
+    #[value(name = "gather-table")]
+    GatherTable,
+    #[value(name = "gather-figure-1")]
+    GatherFigure1,
+    #[value(name = "gather-figure-2")]
+    GatherFigure2,
+    #[value(name = "gather-figure-3")]
+    GatherFigure3,
+    #[value(name = "gather-figure-4")]
+    GatherFigure4,
+    #[value(name = "gather-figure-5")]
+    GatherFigure5,
     All,
 }
 
@@ -122,7 +135,7 @@ struct Item {
     run: fn(&'static str, &PaperFlags, &Path) -> Result<Done, Failure>,
 }
 
-const ITEMS: [Item; 6] = [
+const ITEMS: [Item; 12] = [
     Item {
         name: ItemName::Figure15,
         id: "figure-15",
@@ -164,6 +177,48 @@ const ITEMS: [Item; 6] = [
         source: "Pedersen 2011, figure 19",
         summary: "time in the polygon intersection of the coplanar method",
         run: figure_19::run,
+    },
+    Item {
+        name: ItemName::GatherTable,
+        id: "gather-table",
+        source: "Gjøl et al., section 5",
+        summary: "final gathering: times, memory and errors, classic and with ray differentials",
+        run: gathering::table::run,
+    },
+    Item {
+        name: ItemName::GatherFigure1,
+        id: "gather-figure-1",
+        source: "Gjøl et al., figure 1",
+        summary: "an estimate at the edge of a box: photons, and estimates wholly inside",
+        run: gathering::figure_1::run,
+    },
+    Item {
+        name: ItemName::GatherFigure2,
+        id: "gather-figure-2",
+        source: "Gjøl et al., figure 2",
+        summary: "photons, the ones that are kept, and the first two layers of the pyramid",
+        run: gathering::figure_2::run,
+    },
+    Item {
+        name: ItemName::GatherFigure3,
+        id: "gather-figure-3",
+        source: "Gjøl et al., figure 3",
+        summary: "footprints of gather rays on the hemisphere, and how much they cover",
+        run: gathering::figure_3::run,
+    },
+    Item {
+        name: ItemName::GatherFigure4,
+        id: "gather-figure-4",
+        source: "Gjøl et al., figure 4",
+        summary: "the room by 200 gather rays, with errors",
+        run: gathering::figures_4_5::run_4,
+    },
+    Item {
+        name: ItemName::GatherFigure5,
+        id: "gather-figure-5",
+        source: "Gjøl et al., figure 5",
+        summary: "the room by 800 gather rays, with errors",
+        run: gathering::figures_4_5::run_5,
     },
 ];
 
@@ -222,10 +277,11 @@ fn list(json: bool) -> Result<(), Failure> {
         return print(&to_json(&serde_json::json!({ "version": VERSION, "items": items }))?);
     }
     let mut text = String::new();
-    let width = ITEMS.iter().map(|i| i.source.len()).max().unwrap_or(0);
+    let widest = |f: fn(&Item) -> &str| ITEMS.iter().map(|i| f(i).chars().count()).max().unwrap_or(0);
+    let (id, width) = (widest(|i| i.id), widest(|i| i.source));
     for i in &ITEMS {
-        text.push_str(&format!("{:<9}  {:<width$}  {}\n", i.id, i.source, i.summary));
+        text.push_str(&format!("{:<id$}  {:<width$}  {}\n", i.id, i.source, i.summary));
     }
-    text.push_str(&format!("{:<9}  {:<width$}  every one of them\n", "all", ""));
+    text.push_str(&format!("{:<id$}  {:<width$}  every one of them\n", "all", ""));
     print(&text)
 }

@@ -137,11 +137,27 @@ impl Done {
         report: &T,
         text: &str,
     ) -> Result<Self, Failure> {
-        let [png, csv_file, json_file] = &head.files;
-        let json = to_json(report)?;
-        png_file::write(&folder.join(png), picture.size, &picture.rgb, &head.provenance)?;
-        whole_file::write(&folder.join(csv_file), csv.as_bytes())?;
-        whole_file::write(&folder.join(json_file), json.as_bytes())?;
+        let json = write_files(folder, &head.files, &head.provenance, picture, csv, report)?;
         Ok(Self { json, text: head.line() + text, warnings: head.warnings.clone() })
     }
+}
+
+/// Writes picture, CSV and JSON under the names `files`, in this order; returns the JSON.
+///
+/// # Errors
+/// A file that cannot be written.
+pub fn write_files<T: Serialize>(
+    folder: &Path,
+    files: &[String; 3],
+    provenance: &Provenance,
+    picture: &Canvas,
+    csv: &str,
+    report: &T,
+) -> Result<String, Failure> {
+    let [png, csv_file, json_file] = files;
+    let json = to_json(report)?;
+    png_file::write(&folder.join(png), picture.size, &picture.rgb, provenance)?;
+    whole_file::write(&folder.join(csv_file), csv.as_bytes())?;
+    whole_file::write(&folder.join(json_file), json.as_bytes())?;
+    Ok(json)
 }

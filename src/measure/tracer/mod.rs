@@ -220,6 +220,11 @@ impl<'a> Tracer<'a> {
         &self.batches
     }
 
+    /// Paths for each pixel in a batch.
+    pub fn samples(&self) -> u32 {
+        self.samples
+    }
+
     /// Which tracer it is.
     pub fn method(&self) -> Method {
         self.method

@@ -114,21 +114,15 @@ impl IrradiancePyramid {
     /// half of it; None if
     /// that semi-axis is shorter than the first layer's radius, so that the nearest estimate takes its place.
     pub fn layer_for(&self, longest: f32) -> Option<usize> {
-        let position = self.position_for(longest)?;
-        Some((position.round() as usize).min(self.layers.len().saturating_sub(1)))
-    }
-
-    /// The same as a place between layers: 1.25 is a quarter of the way from the second to the third, in the logarithm of
-    /// the radius.
-    pub fn position_for(&self, longest: f32) -> Option<f32> {
         let first = self.layers.first()?.radius();
-        if !(longest >= first) {
+        if longest.is_nan() || longest < first {
             return None;
         }
-        let Some(second) = self.layers.get(1) else { return Some(0.0) };
+        let Some(second) = self.layers.get(1) else { return Some(0) };
         let growth = libm::log2f(second.radius() / first);
         let last = (self.layers.len() - 1) as f32;
-        Some((libm::log2f(longest * self.share / first) / growth).clamp(0.0, last))
+        let place = libm::log2f(longest * self.share / first) / growth;
+        Some(place.round().clamp(0.0, last) as usize)
     }
 }
 

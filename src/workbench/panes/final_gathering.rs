@@ -69,8 +69,6 @@ fn settings(ui: &mut Ui, f: &mut FinalGathering, scene: f64) -> bool {
             f.growth = growth as f32;
             changed = true;
         }
-        let tip = "whether the two layers nearest to a footprint's size are blended";
-        changed |= one_of(ui, "Blend", tip, &mut f.blend, &[("off", false), ("on", true)]);
     }
     let mut near = f64::from(f.near);
     let tip = "a ray that meets a surface nearer than this gathers a second time from there; 0 for never";
