@@ -485,6 +485,24 @@ fn parts_of_pass(pass: u32) -> u32 {
 mod tests {
     use super::*;
 
+    /// As many hits, fewer rays from each, never more than were asked for.
+    #[test]
+    fn rays_of_final_gathering_can_be_capped() {
+        let scene = crate::scene::open("cornell").expect("built in");
+        let flags = crate::scene::scene_file::RenderFile { photons: Some(500), ..Default::default() };
+        let settings = crate::render::RenderSettings::new(&scene, &flags, Some([16, 12]), 1).expect("valid");
+        let list = crate::estimate::registry::estimators("integrated+classic:rays=40").expect("registered");
+        let pass = crate::render::Pass::alone(scene.into(), settings, &list, 0, &|| false);
+        let pass = pass.expect("fits").expect("not cancelled");
+        let rays = |gather_rays| {
+            let view = ViewPass { gather_rays, ..pass.view() };
+            let slots = crate::render::renderer::slots(&list, Gather::Overlap);
+            view.run(Rect::whole([16, 12]), &slots, &crate::render::watch::Silent).counts.gather.rays
+        };
+        let [few, all] = [16, u32::MAX].map(rays);
+        assert!(few > 0 && few * 40 == all * 16, "{few} {all}");
+    }
+
     #[test]
     fn cells_grow_as_the_fourth_root() {
         let cells: Vec<u32> = [0, 1, 15, 16, 255, 256, u32::MAX].map(cells_of_pass).into();
