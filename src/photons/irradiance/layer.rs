@@ -50,7 +50,7 @@ impl Layer {
     pub fn of_photons(photons: &GlobalPhotons, radius: f32, spacing: f32, how: Estimates) -> Self {
         let all = photons.photons();
         let kept = apart(photons.tree(), all.len(), spacing, |i| (all[i].position, all[i].normal));
-        let estimates = kept
+        let estimates: Vec<IrradianceEstimate> = kept
             .par_iter()
             .map(|&i| {
                 let at = &all[i as usize];
@@ -69,7 +69,7 @@ impl Layer {
                 IrradianceEstimate { position: at.position, normal: at.normal, irradiance, area: 1.0 }
             })
             .collect();
-        let mut layer = Self::new(radius, estimates);
+        let mut layer = Self::new(radius, &estimates);
         if let Estimates::Corrected(areas) = how {
             let shares: Vec<f32> = layer.estimates.par_iter().map(|e| layer.share(e, areas)).collect();
             layer.estimates.iter_mut().zip(shares).for_each(|(e, share)| e.area = share);
@@ -86,11 +86,11 @@ impl Layer {
     pub fn of_layer(finer: &Self, radius: f32, spacing: f32, how: Estimates) -> Self {
         let all = &finer.estimates;
         let kept = apart(&finer.tree, all.len(), spacing, |i| (all[i].position, all[i].normal));
-        let estimates = match how {
+        let estimates: Vec<IrradianceEstimate> = match how {
             Estimates::AsPublished => kept.par_iter().map(|&i| finer.mean_inside(&all[i as usize], radius)).collect(),
             Estimates::Corrected(_) => finer.cell_means(&kept),
         };
-        Self::new(radius, estimates)
+        Self::new(radius, &estimates)
     }
 
     /// The estimate of that radius at the place of one of these, of those of which the whole disc lies inside.
@@ -130,7 +130,7 @@ impl Layer {
         (0..).zip(&means).map(cell).collect()
     }
 
-    fn new(radius: f32, estimates: Vec<IrradianceEstimate>) -> Self {
+    fn new(radius: f32, estimates: &[IrradianceEstimate]) -> Self {
         let tree = KdTree::new(estimates.iter().map(|e| e.position));
         let estimates = tree.order().iter().map(|&i| estimates[i as usize]).collect();
         Self { radius, estimates, tree: tree.renumbered() }

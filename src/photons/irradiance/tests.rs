@@ -216,7 +216,7 @@ fn odd_rooms_have_a_pyramid() {
     let stored = traced(&scene, 400);
     let one = stored.global[0];
     let triangle: Vec<Photon> = stored.direct.iter().filter(|p| p.normal == stored.direct[0].normal).copied().collect();
-    let sets = [vec![], vec![one], vec![one; 500], triangle, stored.global.clone()];
+    let sets = [vec![], vec![one], vec![one; 500], triangle, stored.global];
     for global in sets {
         let count = global.len();
         let stored = StoredPhotons { global, ..Default::default() };
