@@ -43,6 +43,8 @@ struct Row {
     /// Seconds of the image beside the others, without the photons and what is made of them.
     image_s: f64,
     error: Option<ErrorMetrics>,
+    /// Relative RMSE without the reference's own noise.
+    net_relative_rmse: Option<f64>,
 }
 
 #[derive(Serialize)]
@@ -100,19 +102,23 @@ fn run(
     }
     let images: Vec<Image> = (0..slots.len()).map(|i| result.image(i, whole)).collect();
     let rows: Vec<Row> = (0..slots.len())
-        .map(|i| Row {
-            way: Way::SHOWN[i],
-            estimator: estimators[i].name(),
-            image_s: result.seconds[i].total(),
-            error: truth.error(&images[i]),
+        .map(|i| {
+            let error = truth.error(&images[i]);
+            Row {
+                way: Way::SHOWN[i],
+                estimator: estimators[i].name(),
+                image_s: result.seconds[i].total(),
+                error,
+                net_relative_rmse: error.and_then(|e| truth.net(e.relative_rmse)),
+            }
         })
         .collect();
     let mut head = Head::new(item, source, &pass.scene, &pass.settings);
     head.warnings.extend(truth.warnings.iter().cloned());
     let facts = truth.facts();
     let picture = draw(&images, &rows, &truth, rays, &head);
-    let mut table = Table::new(["final gathering", "image s", "x classic", "error", "mean"]);
-    let mut csv = String::from("rays,way,estimator,image_s,relative_rmse,mean_ratio\n");
+    let mut table = Table::new(["final gathering", "image s", "x classic", "error", "net", "mean"]);
+    let mut csv = String::from("rays,way,estimator,image_s,relative_rmse,net_relative_rmse,mean_ratio\n");
     let classic = rows.first().map_or(0.0, |r| r.image_s).max(f64::MIN_POSITIVE);
     for r in &rows {
         table.row([
@@ -120,15 +126,17 @@ fn run(
             format!("{:.2}", r.image_s),
             format!("{:.2}", r.image_s / classic),
             percent(r.error.map(|e| e.relative_rmse)),
+            percent(r.net_relative_rmse),
             r.error.map_or("-".into(), |e| format!("{:.3}", e.mean_ratio)),
         ]);
         let of = |f: fn(&ErrorMetrics) -> f64| r.error.as_ref().map_or(String::new(), |e| format!("{:.6}", f(e)));
+        let net = r.net_relative_rmse.map_or(String::new(), |e| format!("{e:.6}"));
         let (error, mean) = (of(|e| e.relative_rmse), of(|e| e.mean_ratio));
         // Writing to a string cannot fail.
-        let _ = writeln!(csv, "{rays},{},\"{}\",{:.6},{error},{mean}", r.way.name(), r.estimator, r.image_s);
+        let _ = writeln!(csv, "{rays},{},\"{}\",{:.6},{error},{net},{mean}", r.way.name(), r.estimator, r.image_s);
     }
     let text = format!(
-        "{}\n{rays} gather rays, {} photons emitted, first radius {RADIUS} m; {}\n",
+        "{}\n{rays} gather rays, {} photons emitted, first radius {RADIUS} m; net: the error without the reference's own noise\n{}\n",
         table.text(),
         pass.photons.emitted,
         facts.line()

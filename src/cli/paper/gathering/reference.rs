@@ -89,6 +89,12 @@ impl Truth {
         metrics::compare(image, &self.reference.image, &self.mask).ok()
     }
 
+    /// What of a relative RMSE is left without the reference's own noise, which adds to it in squares; None if unknown.
+    pub fn net(&self, relative_rmse: f64) -> Option<f64> {
+        let noise = self.reference.relative_noise(&self.mask)?;
+        Some((relative_rmse * relative_rmse - noise * noise).max(0.0).sqrt())
+    }
+
     /// Facts for files.
     pub fn facts(&self) -> TruthFacts {
         let pixels = self.mask.counts.iter().filter(|c| **c).count();

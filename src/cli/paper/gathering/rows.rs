@@ -66,6 +66,8 @@ pub struct Row {
     pub printed_ratio: f64,
     /// Error against the reference; None if no pixel counts.
     pub error: Option<ErrorMetrics>,
+    /// Relative RMSE without the reference's own noise.
+    pub net_relative_rmse: Option<f64>,
 }
 
 impl Section {
@@ -98,6 +100,7 @@ fn row(cell: &Cell, classic: &[f64], printed: &PrintedTable, truth: &Truth) -> R
         Way::Classic => (r.classic, 1.0),
         _ => (r.ray_differentials, r.ratio()),
     };
+    let error = truth.error(&cell.image);
     let (printed_total, printed_ratio) = line.map_or((0.0, 0.0), in_print);
     Row {
         rays: cell.rays,
@@ -111,7 +114,8 @@ fn row(cell: &Cell, classic: &[f64], printed: &PrintedTable, truth: &Truth) -> R
         ratio_to_classic: Spread::of(&ratios),
         printed_total,
         printed_ratio,
-        error: truth.error(&cell.image),
+        error,
+        net_relative_rmse: error.and_then(|e| truth.net(e.relative_rmse)),
     }
 }
 
@@ -131,6 +135,7 @@ pub fn text(section: &Section) -> String {
         "printed s",
         "printed x",
         "error",
+        "net",
         "mean",
     ]);
     for r in &section.rows {
@@ -147,6 +152,7 @@ pub fn text(section: &Section) -> String {
             format!("{:.1}", r.printed_total),
             format!("{:.3}", r.printed_ratio),
             percent(r.error.map(|e| e.relative_rmse)),
+            percent(r.net_relative_rmse),
             r.error.map_or("-".into(), |e| format!("{:.3}", e.mean_ratio)),
         ]);
     }
@@ -238,7 +244,7 @@ pub fn summary(sections: &[Section]) -> String {
 /// One line for each cell.
 pub fn csv(sections: &[Section]) -> String {
     let mut csv = String::from(
-        "photons,radius_m,rays,way,estimator,emission_s,tree_s,first_layer_s,other_layers_s,image_s,total_s,total_least_s,total_largest_s,ratio_to_classic,ratio_least,ratio_largest,printed_total_s,printed_ratio,relative_rmse,mean_ratio,photon_map_bytes,peak_bytes,layers_bytes\n",
+        "photons,radius_m,rays,way,estimator,emission_s,tree_s,first_layer_s,other_layers_s,image_s,total_s,total_least_s,total_largest_s,ratio_to_classic,ratio_least,ratio_largest,printed_total_s,printed_ratio,relative_rmse,net_relative_rmse,mean_ratio,photon_map_bytes,peak_bytes,layers_bytes\n",
     );
     for s in sections {
         for r in &s.rows {
@@ -266,7 +272,7 @@ pub fn csv(sections: &[Section]) -> String {
             // Writing to a string cannot fail.
             let _ = writeln!(
                 csv,
-                "{},{},{},{},\"{}\",{},{},{},{},{},{}",
+                "{},{},{},{},\"{}\",{},{},{},{},{},{},{}",
                 s.photons_emitted,
                 s.printed.radius,
                 r.rays,
@@ -274,6 +280,7 @@ pub fn csv(sections: &[Section]) -> String {
                 r.estimator,
                 numbers.join(","),
                 error(&|e| e.relative_rmse),
+                r.net_relative_rmse.map_or(String::new(), |e| format!("{e:.6}")),
                 error(&|e| e.mean_ratio),
                 bytes(&|m| m.photon_map),
                 bytes(&|m| m.peak),

@@ -69,7 +69,7 @@ pub fn run(item: &'static str, flags: &PaperFlags, folder: &Path) -> Result<Done
     let layers_on_disk = verdict(sections.iter().flat_map(|s| s.memory.iter().map(|m| &m.bytes)));
     let tables: Vec<String> = sections.iter().map(text).collect();
     let printed = format!(
-        "{}\n{}\n{}\ntotal: trees, layers and image with direct light, without the photons, as in print; {} thread(s), the median of {repeats} repeat(s), ways in turn; ratios within a repeat\n{}\n{layers_on_disk}\n",
+        "{}\n{}\n{}\ntotal: trees, layers and image with direct light, without the photons, as in print; {} thread(s), the median of {repeats} repeat(s), ways in turn; ratios within a repeat; net: the error without the reference's own noise\n{}\n{layers_on_disk}\n",
         tables.join("\n"),
         memory_text(&sections),
         summary(&sections),
