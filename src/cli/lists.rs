@@ -3,6 +3,8 @@
 use crate::cli::failure::Failure;
 use crate::cli::table::Table;
 use crate::cli::{print, to_json};
+use crate::estimate::FinalGatherMethod;
+use crate::estimate::final_gathering::SETTINGS;
 use crate::estimate::registry::ESTIMATORS;
 use crate::scene::built_in::BUILT_IN;
 use crate::scene::source::open_built_in;
@@ -72,7 +74,12 @@ pub fn estimators(args: &ListArgs) -> Result<(), Failure> {
                 })
             })
             .collect();
-        return print(&to_json(&json!({ "version": env!("CARGO_PKG_VERSION"), "estimators": list }))?);
+        let gathering: Vec<_> = FinalGatherMethod::ALL
+            .iter()
+            .map(|(name, m)| json!({ "id": name, "source": m.source(), "summary": m.summary(), "settings": SETTINGS }))
+            .collect();
+        let version = env!("CARGO_PKG_VERSION");
+        return print(&to_json(&json!({ "version": version, "estimators": list, "final_gathering": gathering }))?);
     }
     let mut text = String::new();
     for e in ESTIMATORS {
@@ -81,6 +88,12 @@ pub fn estimators(args: &ListArgs) -> Result<(), Failure> {
             text.push_str(&format!("{:15}settings (default first): {}\n", "", e.settings));
         }
     }
-    text.push_str("Write settings after a colon, as in multi_sampled:n=8,grid=cells\n");
+    text.push_str("Write settings after a colon, as in multi_sampled:n=8,grid=cells\n\n");
+    text.push_str("Global light by final gathering, with --final-gather or after a plus sign:\n");
+    for (name, method) in FinalGatherMethod::ALL {
+        text.push_str(&format!("{name:<18} {}\n{:19}from {}\n", method.summary(), "", method.source()));
+    }
+    text.push_str(&format!("settings (default first): {SETTINGS}\n"));
+    text.push_str("as in integrated+ray-differentials:rays=800,pattern=sobol\n");
     print(&text)
 }

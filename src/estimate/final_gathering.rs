@@ -23,6 +23,24 @@ impl FinalGatherMethod {
     pub const ALL: [(&'static str, Self); 3] =
         [("classic", Self::Classic), ("precomputed", Self::Precomputed), ("ray-differentials", Self::RayDifferentials)];
 
+    /// Where it comes from.
+    pub fn source(self) -> &'static str {
+        match self {
+            Self::Classic => "Jensen 2001",
+            Self::Precomputed => "Christensen 1999",
+            Self::RayDifferentials => "Gjøl, Larsen and Christensen, Final Gathering using Ray Differentials",
+        }
+    }
+
+    /// What it is.
+    pub fn summary(self) -> &'static str {
+        match self {
+            Self::Classic => "gather rays look the k nearest photons up",
+            Self::Precomputed => "gather rays take the nearest precomputed irradiance",
+            Self::RayDifferentials => "gather rays average precomputed irradiance over their footprints",
+        }
+    }
+
     /// Its name in flags and files.
     pub fn name(self) -> &'static str {
         match self {
@@ -87,6 +105,10 @@ pub struct FinalGathering {
     pub near: f32,
 }
 
+/// Settings of every method with their values, the default first.
+pub const SETTINGS: &str = "rays=200, pattern=spiral|sobol|stratified, differentials=corrected|as_published, \
+    estimates=corrected|as_published, reach=surface|facing, radius=auto|METRES, growth=2, near=METRES";
+
 /// Most rays from a view hit.
 pub const MAX_RAYS: u32 = 1 << 16;
 /// Rays from a view hit where nothing else is asked for.
@@ -116,6 +138,14 @@ impl FinalGathering {
     /// # Errors
     /// An unknown method or setting, or a value out of range.
     pub fn parse(text: &str) -> Result<Option<Self>, SpecError> {
+        Self::parse_with(text, DEFAULT_RAYS)
+    }
+
+    /// The same with so many rays where the text names none.
+    ///
+    /// # Errors
+    /// As [`FinalGathering::parse`].
+    pub fn parse_with(text: &str, rays: u32) -> Result<Option<Self>, SpecError> {
         let spec = Spec::parse(text)?;
         if spec.id == "none" {
             spec.only(&[])?;
@@ -138,7 +168,7 @@ impl FinalGathering {
         };
         Ok(Some(Self {
             method,
-            rays: spec.integer("rays", DEFAULT_RAYS, 1..=MAX_RAYS)?,
+            rays: spec.integer("rays", rays, 1..=MAX_RAYS)?,
             pattern: spec.choice("pattern", default.pattern, &PATTERNS)?,
             differentials_as_published: spec.choice("differentials", false, &CORRECTED)?,
             estimates_as_published: spec.choice("estimates", false, &CORRECTED)?,
@@ -278,6 +308,24 @@ mod tests {
         assert_eq!(FinalGathering::parse("none"), Ok(None));
         let short = FinalGathering::parse("ray_differentials").expect("valid");
         assert_eq!(short, Some(FinalGathering::new(FinalGatherMethod::RayDifferentials)));
+    }
+
+    /// What the list of settings says is what is read, and each setting has its key.
+    #[test]
+    fn the_list_of_settings_is_read_as_it_stands() {
+        let known: Vec<&str> = SETTINGS.split(", ").filter_map(|s| s.split('=').next()).map(str::trim).collect();
+        assert_eq!(known, KEYS);
+        for setting in SETTINGS.split(", ") {
+            let (key, values) = setting.trim().split_once('=').expect("a setting");
+            for value in values.split('|') {
+                let value = if value == "METRES" { "0.25" } else { value };
+                let text = format!("precomputed:{key}={value}");
+                assert!(FinalGathering::parse(&text).is_ok(), "{text}");
+            }
+            let default = values.split('|').next().filter(|v| *v != "METRES").unwrap_or("0");
+            let parsed = FinalGathering::parse(&format!("precomputed:{key}={default}")).expect("valid");
+            assert_eq!(parsed, Some(FinalGathering::new(FinalGatherMethod::Precomputed)), "{key}");
+        }
     }
 
     #[test]

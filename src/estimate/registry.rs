@@ -136,17 +136,18 @@ pub fn with_final_gathering(
     each.map(|name| estimator(&name)).collect()
 }
 
-/// A list of final gatherings, as in `none,classic,ray-differentials:rays=200,pattern=sobol`; None stands for `none`.
+/// A list of final gatherings, as in `none,classic,ray-differentials:rays=200,pattern=sobol`; None stands for `none`. Those
+/// that do not say so take `rays`.
 ///
 /// # Errors
 /// As [`FinalGathering::parse`], or an empty list.
-pub fn final_gatherings(text: &str) -> Result<Vec<Option<FinalGathering>>, SpecError> {
+pub fn final_gatherings(text: &str, rays: u32) -> Result<Vec<Option<FinalGathering>>, SpecError> {
     let specs = split_list(text);
     if specs.is_empty() {
         let what = "name at least one of none, classic, precomputed, ray-differentials".to_owned();
         return Err(SpecError { text: text.to_owned(), what });
     }
-    specs.iter().map(|s| FinalGathering::parse(s)).collect()
+    specs.iter().map(|s| FinalGathering::parse_with(s, rays)).collect()
 }
 
 /// A list as in `regular,multi_sampled:n=8,grid=cells,integrated`: a part without a name that is known belongs to the
@@ -270,7 +271,7 @@ mod tests {
     #[test]
     fn final_gathering_goes_with_each_estimator() {
         let list = estimators("integrated,multi_sampled:n=2,grid=cells+classic:rays=8,pattern=sobol").expect("parses");
-        let all = final_gatherings("none,ray-differentials:rays=9,growth=3").expect("parses");
+        let all = final_gatherings("none,ray-differentials:rays=9,growth=3", 200).expect("parses");
         let names: Vec<_> = with_final_gathering(&list, &all).expect("valid").iter().map(|e| e.name()).collect();
         assert_eq!(
             names,
@@ -280,7 +281,10 @@ mod tests {
                 "multi_sampled:n=2,grid=cells+classic:rays=8,pattern=sobol"
             ]
         );
-        assert!(final_gatherings("").is_err() && final_gatherings("rays=3").is_err());
+        assert!(final_gatherings("", 9).is_err() && final_gatherings("rays=3", 9).is_err());
+        // One that names its rays keeps them.
+        let rays = final_gatherings("classic:rays=200,precomputed", 800).expect("parses");
+        assert_eq!(rays.iter().flatten().map(|f| f.rays).collect::<Vec<_>>(), [200, 800]);
     }
 
     #[test]

@@ -16,7 +16,7 @@ const METHODS: &str = "classic:rays=400,ray-differentials:rays=400,precomputed:r
                        ray-differentials:rays=400,reach=facing,pattern=sobol";
 
 fn settings(text: &str) -> Vec<FinalGathering> {
-    final_gatherings(text).expect("valid").into_iter().flatten().collect()
+    final_gatherings(text, 200).expect("valid").into_iter().flatten().collect()
 }
 
 /// The room of two lights with all surfaces of one reflectance.

@@ -290,7 +290,7 @@ fn light_of_photons(view: &ViewPass, slot: &Slot, rect: Rect, scratch: &mut Scra
     let rays = slot.estimator.rays_per_axis();
     let mut base = view.trace(rect, rays, scratch, &mut ViewCounts::default(), &mut Unrecorded);
     base.fill(DVec3::ZERO);
-    view.estimate(&base, rays, slot, scratch).pixels
+    view.estimate(&base, rays, slot, scratch, &|| false).map(|image| image.pixels).unwrap_or_default()
 }
 
 /// Square of what a photon adds to the mean channel of its pixel.

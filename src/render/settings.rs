@@ -198,7 +198,7 @@ impl RenderSettings {
     /// The final gatherings of [`RenderSettings::final_gather`]; None stands for `none`.
     pub fn final_gatherings(&self) -> Vec<Option<FinalGathering>> {
         // Its text was read when the settings were made.
-        registry::final_gatherings(&self.final_gather).unwrap_or_else(|_| vec![None])
+        registry::final_gatherings(&self.final_gather, DEFAULT_RAYS).unwrap_or_else(|_| vec![None])
     }
 
     /// Each estimator that names no final gathering itself with each of these settings' in turn.
@@ -304,14 +304,10 @@ impl Picker<'_> {
         let rays = self.integer("final_gather_rays", |f| f.final_gather_rays, i64::from(DEFAULT_RAYS), 1, most)?;
         let (value, from_flag) = self.get(|f| f.final_gather.as_deref());
         let Some(text) = value else { return Ok(no_final_gathering()) };
-        let all = registry::final_gatherings(text).map_err(|e| self.wrong("final_gather", from_flag, e.to_string()))?;
-        let name = |f: &Option<FinalGathering>| match f {
-            None => no_final_gathering(),
-            // One that names its rays itself keeps them.
-            Some(f) if f.rays != DEFAULT_RAYS => f.to_string(),
-            Some(f) => FinalGathering { rays: rays as u32, ..*f }.to_string(),
-        };
-        Ok(all.iter().map(name).collect::<Vec<_>>().join(","))
+        let all = registry::final_gatherings(text, rays as u32)
+            .map_err(|e| self.wrong("final_gather", from_flag, e.to_string()))?;
+        let name = |f: Option<FinalGathering>| f.map_or_else(no_final_gathering, |f| f.to_string());
+        Ok(all.into_iter().map(name).collect::<Vec<_>>().join(","))
     }
 
     fn estimator(&self) -> Result<String, SettingError> {

@@ -252,7 +252,7 @@ impl ViewPass<'_> {
                     if watch.cancelled() {
                         return None;
                     }
-                    let mut image = self.estimate(&base, n, &slots[i], scratch);
+                    let mut image = self.estimate(&base, n, &slots[i], scratch, &|| watch.cancelled())?;
                     image.seconds.view_trace = view_trace;
                     counts.overflow += image.overflow;
                     counts.disc_floor += image.disc_floor;
@@ -332,7 +332,16 @@ impl ViewPass<'_> {
 
     /// Gathers and estimates for the scratch's hits in batches, each part of a batch timed as a whole. A tile is one
     /// batch unless photons overlap by the thousand, so that memory stays bounded.
-    pub(super) fn estimate(&self, base: &[DVec3], n: u32, slot: &Slot, scratch: &mut Scratch) -> TileImage {
+    ///
+    /// None if it was cancelled while it gathered finally, which may take many seconds for a tile.
+    pub(super) fn estimate(
+        &self,
+        base: &[DVec3],
+        n: u32,
+        slot: &Slot,
+        scratch: &mut Scratch,
+        cancelled: &dyn Fn() -> bool,
+    ) -> Option<TileImage> {
         let mut sums = base.to_vec();
         let mut seconds = PartSeconds::default();
         let (mut gathered, mut disc_floor) = (0, 0);
@@ -374,6 +383,9 @@ impl ViewPass<'_> {
         scratch.gather.counts = GatherCounts::default();
         if let Some(gatherer) = self.gatherer(slot) {
             for hit in &scratch.hits {
+                if cancelled() {
+                    return None;
+                }
                 let irradiance = gatherer.irradiance(&hit.point(), hit.seed, &mut scratch.gather, &mut Unheard);
                 sums[hit.pixel as usize] += irradiance * hit.weight.as_dvec3();
             }
@@ -389,7 +401,7 @@ impl ViewPass<'_> {
                 pixel
             })
             .collect();
-        TileImage { pixels, seconds, gathered, overflow, disc_floor, gather_counts: scratch.gather.counts }
+        Some(TileImage { pixels, seconds, gathered, overflow, disc_floor, gather_counts: scratch.gather.counts })
     }
 
     /// What gathers global light for a slot, if final gathering does.
