@@ -8,6 +8,7 @@ use cusp::estimate::registry::{estimator, estimators};
 use cusp::estimate::{Estimator, Gathered, View};
 use cusp::math::angle::angle;
 use cusp::math::sequence::{Sampling, Sequence};
+use cusp::photons::irradiance::surface_area::SurfaceAreas;
 use cusp::photons::irradiance::{GlobalPhotons, IrradiancePyramid, PyramidSettings};
 use cusp::photons::kd_tree::Nearest;
 use cusp::photons::map::{FootprintLimits, MapParts, Query};
@@ -241,7 +242,7 @@ fn final_gathering(c: &mut Criterion) {
         let settings = PyramidSettings { radius: 0.08, growth: 2.0, as_published, layers: usize::MAX };
         group.bench_function(format!("build/{name}"), |b| {
             b.iter(|| {
-                let mut pyramid = IrradiancePyramid::new(&pass.scene, &tree, &settings);
+                let mut pyramid = IrradiancePyramid::new(&SurfaceAreas::new(&pass.scene), &tree, &settings);
                 pyramid.grow(&pass.scene, &settings);
                 pyramid.layers().len()
             });

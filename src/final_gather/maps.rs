@@ -25,6 +25,8 @@ pub struct GatherMaps {
     smallest: f32,
     /// Seconds to build the tree over all photons.
     photon_seconds: f64,
+    /// Seconds to find the surfaces that pyramids are made on.
+    area_seconds: f64,
 }
 
 impl GatherMaps {
@@ -41,7 +43,10 @@ impl GatherMaps {
         let photon_seconds = start.elapsed().as_secs_f64();
         let count = photons.photons().len().max(1);
         // A disc that holds k photons where they are spread evenly.
-        let per_photon = SurfaceAreas::new(scene).total() / count as f64;
+        let start = Instant::now();
+        let areas = SurfaceAreas::new(scene);
+        let area_seconds = start.elapsed().as_secs_f64();
+        let per_photon = areas.total() / count as f64;
         let radius = (k as f64 * per_photon / std::f64::consts::PI).sqrt() as f32;
         let mut maps = Self {
             automatic_radius: radius.clamp(scene.resolution(), scene.radius),
@@ -50,6 +55,7 @@ impl GatherMaps {
             farthest: 2.0 * scene.radius,
             smallest: scene.resolution(),
             photon_seconds,
+            area_seconds,
             ..Default::default()
         };
         for f in wanted {
@@ -58,7 +64,7 @@ impl GatherMaps {
             match maps.pyramids.iter_mut().find(|(s, _)| first(s) == first(&settings) && s.growth == settings.growth) {
                 Some((s, _)) => s.layers = s.layers.max(settings.layers),
                 None => {
-                    let pyramid = IrradiancePyramid::new(scene, &photons, &settings);
+                    let pyramid = IrradiancePyramid::new(&areas, &photons, &settings);
                     maps.pyramids.push((settings, pyramid));
                 }
             }
@@ -128,8 +134,8 @@ impl GatherMaps {
     /// Seconds to build what a final gathering looks up, as if it were alone: the photons' tree, and its layers.
     pub fn seconds(&self, f: &FinalGathering) -> f64 {
         let layers = self.pyramid(f).map_or(0.0, |p| match f.method {
-            FinalGatherMethod::RayDifferentials => p.seconds().first + p.seconds().others,
-            _ => p.seconds().first,
+            FinalGatherMethod::RayDifferentials => self.area_seconds + p.seconds().first + p.seconds().others,
+            _ => self.area_seconds + p.seconds().first,
         });
         self.photon_seconds + layers
     }
@@ -137,16 +143,5 @@ impl GatherMaps {
     /// Seconds to build the tree over all photons.
     pub fn photon_seconds(&self) -> f64 {
         self.photon_seconds
-    }
-
-    /// Seconds to build all of it.
-    pub fn all_seconds(&self) -> f64 {
-        self.photon_seconds + self.pyramids().map(|p| p.seconds().first + p.seconds().others).sum::<f64>()
-    }
-
-    /// Memory that it holds, bytes.
-    pub fn bytes(&self) -> usize {
-        let photons = [&self.photons, &self.caustic].into_iter().flatten().map(GlobalPhotons::bytes).sum::<usize>();
-        photons + self.pyramids().map(|p| p.memory().layers as usize).sum::<usize>()
     }
 }

@@ -15,6 +15,7 @@ pub mod settings;
 pub mod stats;
 pub mod stop;
 pub mod tiles;
+pub mod totals;
 pub mod view;
 pub mod view_pass;
 pub mod watch;

@@ -1,6 +1,6 @@
 //! The progressive renderer: a value that makes one pass at each step.
 
-use crate::estimate::{Estimator, FinalGathering, Lookup};
+use crate::estimate::{Estimator, Lookup};
 use crate::final_gather::GatherCounts;
 use crate::render::change::{PhotonStore, World, film_is_kept, photons_are_kept};
 use crate::render::error_estimate::ErrorEstimate;
@@ -13,6 +13,7 @@ use crate::render::plan::{Pilot, Plan, Slot};
 use crate::render::settings::{Gather, PlanMode, RenderSettings};
 use crate::render::stats::{Bounded, Seconds, StoredCounts};
 use crate::render::tiles::TILE;
+use crate::render::totals::Totals;
 use crate::render::view_pass::{PartSeconds, ViewPass, ViewResult};
 use crate::render::watch::{FilmWatch, Watch};
 use crate::scene::Scene;
@@ -71,13 +72,7 @@ pub struct Renderer {
     estimator_seconds: Vec<PartSeconds>,
     photon_seconds: Vec<f64>,
     gathered: Vec<u64>,
-    /// Passes whose photons are in the counts below.
-    counted: u32,
-    emitted: u64,
-    stored: StoredCounts,
-    bounded: Bounded,
-    inside_glass: u64,
-    gather_counts: GatherCounts,
+    totals: Totals,
     /// Area of footprints for each pass so far.
     areas: Vec<f64>,
     /// What a pass was expected to need, when it was asked last.
@@ -128,12 +123,7 @@ impl Renderer {
             last: None,
             photons: PhotonStore::default(),
             seconds: Seconds { bvh, ..Default::default() },
-            counted: 0,
-            emitted: 0,
-            stored: StoredCounts::default(),
-            bounded: Bounded::default(),
-            inside_glass: 0,
-            gather_counts: GatherCounts::default(),
+            totals: Totals::default(),
             areas: vec![1.0],
             need: None,
         }
@@ -152,8 +142,8 @@ impl Renderer {
         let fits = films.len() == self.films.len() && films.iter().all(|f| f.size() == self.settings.size);
         if fits {
             self.films = films;
-            self.counted = self.passes();
-            (self.emitted, self.stored) = (emitted, stored);
+            self.totals.passes = self.passes();
+            (self.totals.emitted, self.totals.stored) = (emitted, stored);
             self.seconds = Seconds { bvh: self.seconds.bvh, plan: self.seconds.plan, ..seconds };
         }
         fits
@@ -214,12 +204,7 @@ impl Renderer {
 
     fn forget_counts(&mut self) {
         self.last = None;
-        self.counted = 0;
-        self.emitted = 0;
-        self.stored = StoredCounts::default();
-        self.bounded = Bounded::default();
-        self.inside_glass = 0;
-        self.gather_counts = GatherCounts::default();
+        self.totals = Totals::default();
         self.seconds = Seconds { bvh: self.seconds.bvh, plan: self.seconds.plan, ..Default::default() };
     }
 
@@ -278,7 +263,7 @@ impl Renderer {
             return Step::Cancelled;
         };
         self.record(&pass, &now, &result, photon_trace);
-        if pass.number == self.counted {
+        if pass.number == self.totals.passes {
             self.count(&pass, photon_trace, map_build);
         }
         for tile in &result.tiles {
@@ -391,11 +376,7 @@ impl Renderer {
 
     /// Adds up what the estimators `now` cost.
     fn record(&mut self, pass: &Pass, now: &[usize], result: &ViewResult, photon_trace: f64) {
-        self.bounded.views += result.counts.bounded;
-        self.inside_glass += result.counts.camera_inside_glass;
-        self.bounded.overflow += result.counts.overflow;
-        self.bounded.disc_floor += result.counts.disc_floor;
-        self.gather_counts += result.counts.gather;
+        self.totals.add_views(&result.counts);
         self.seconds.view_trace += result.view_trace;
         for (slot, &i) in now.iter().enumerate() {
             let s = &result.seconds[slot];
@@ -417,19 +398,9 @@ impl Renderer {
 
     /// Adds up the photons of a pass that is seen for the first time.
     fn count(&mut self, pass: &Pass, photon_trace: f64, map_build: f64) {
-        self.counted += 1;
+        self.totals.add_photons(pass);
         self.seconds.photon_trace += photon_trace;
         self.seconds.map_build += map_build;
-        let (photons, stored) = (&pass.photons, &pass.photons.stored);
-        self.emitted += photons.emitted;
-        self.stored.direct += stored.direct.len() as u64;
-        self.stored.caustic += stored.caustic.len() as u64;
-        self.stored.global += stored.global.len() as u64;
-        self.bounded.photons += photons.counts;
-        let (floor, ceiling) = pass.maps.limited();
-        self.bounded.footprint_floor += floor;
-        self.bounded.footprint_ceiling += ceiling;
-        self.bounded.cut_off_power += (photons.cut_off - self.bounded.cut_off_power) / f64::from(self.counted);
     }
 
     /// What traces photons under `plan` and `settings`, which may ask for another number of photons.
@@ -517,56 +488,27 @@ impl Renderer {
 
     /// Photons emitted in all passes.
     pub fn emitted(&self) -> u64 {
-        self.emitted
+        self.totals.emitted
     }
 
     /// Photons stored in all passes.
     pub fn stored(&self) -> StoredCounts {
-        self.stored
+        self.totals.stored
     }
 
     /// Rays of final gathering in all passes, and how they ended.
     pub fn gather_counts(&self) -> &GatherCounts {
-        &self.gather_counts
+        &self.totals.gather
     }
 
     /// What was bounded in all passes.
     pub fn bounded(&self) -> &Bounded {
-        &self.bounded
+        &self.totals.bounded
     }
 
     /// What was defined but odd: the scene's warnings, and what the passes met.
     pub fn warnings(&self) -> Vec<String> {
-        let mut all = self.scene.warnings.clone();
-        if self.counted > 0 && self.plan.needs_photons() && self.stored == StoredCounts::default() {
-            all.push(format!("none of {} photons was stored", self.emitted));
-        }
-        if self.bounded.overflow > 0 {
-            all.push(format!(
-                "{} pixel values of all passes are beyond 32 bits and were lowered to 3.4e38; lower the power of lights",
-                self.bounded.overflow
-            ));
-        }
-        if self.inside_glass > 0 {
-            all.push(format!("the camera stands inside glass: {} view rays start there", self.inside_glass));
-        }
-        let gathers = &self.gather_counts;
-        let part = 100.0 * gathers.unknown as f64 / gathers.rays.max(1) as f64;
-        // A few rays always end in the dark under something; they are counted, and no reason for more photons.
-        if part >= 0.05 {
-            all.push(format!(
-                "{} gather rays ({part:.2} %) end where no photon has arrived and brought no light; emit more photons",
-                gathers.unknown
-            ));
-        }
-        let below = |f: &&FinalGathering| f.radius.is_some_and(|r| r < self.scene.resolution());
-        if let Some(f) = self.plan.final_gatherings.iter().find(below) {
-            all.push(format!(
-                "{f}: its radius is below the resolution of 32 bits in this scene and was raised to {:e} m",
-                self.scene.resolution()
-            ));
-        }
-        all
+        self.totals.warnings(&self.scene, &self.plan)
     }
 }
 

@@ -39,8 +39,8 @@ pub fn run(item: &'static str, flags: &PaperFlags, folder: &Path) -> Result<Done
     for (row, image) in rows.iter_mut().zip(&shown.images) {
         match reference.as_ref().map(|r| r.error_of(image)) {
             Some(Ok(error)) => row.reference_error = Some(error),
-            Some(Err(why)) if head.warnings.is_empty() => {
-                head.warnings.push(format!("no error against the built-in reference: {why}"));
+            Some(Err(why)) if head.origin.warnings.is_empty() => {
+                head.origin.warnings.push(format!("no error against the built-in reference: {why}"));
             }
             _ => {}
         }

@@ -90,12 +90,12 @@ pub fn run(item: &'static str, flags: &PaperFlags, folder: &Path) -> Result<Done
     let profiles = GATHERS.into_iter().map(|g| profile(&case, g, repeats)).collect::<Result<Vec<_>, _>>()?;
     let mut head = Head::new(&case, item, "Pedersen 2011, figure 19, page 41");
     // Whatever --threads says: this item's clocks are those of one thread.
-    head.threads = 1;
+    head.origin.threads = 1;
     let text = format!(
         "{}\nshares of one thread's time for the whole view pass, the median of {repeats} repeats; in brackets the range\nprinted: {:.1} % in get_intersection ({}), the polygon intersection alone\n",
         table(&profiles),
         100.0 * printed::POLYGON_SHARE,
-        head.source,
+        head.origin.source,
     );
     let printed =
         Printed { function: "get_intersection", share: printed::POLYGON_SHARE, source: "Pedersen 2011, section 5.2" };
@@ -251,7 +251,7 @@ fn chart(profiles: &[Profile], head: &Head) -> Chart {
     }];
     bars.extend(profiles.iter().map(|p| Bar {
         label: match p.gather {
-            Gather::Knn => format!("measured, the {} nearest", head.settings.k),
+            Gather::Knn => format!("measured, the {} nearest", head.origin.settings.k),
             Gather::Overlap => "measured, all that overlap".into(),
         },
         segments: p.steps.iter().zip(&colors).map(|(s, c)| Segment { value: s.share.median, color: *c }).collect(),

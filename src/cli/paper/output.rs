@@ -8,6 +8,7 @@ use crate::export::text::Canvas;
 use crate::export::{Provenance, png_file, whole_file};
 use crate::render::settings::RenderSettings;
 use crate::render::stats::StoredCounts;
+use crate::scene::Scene;
 use serde::Serialize;
 use std::path::Path;
 
@@ -24,32 +25,55 @@ pub struct PrintedSetup {
     pub diff_smoothing: f64,
 }
 
-/// The start of every item's JSON.
+/// Where an item comes from: the start of every item's JSON.
 #[derive(Clone, Debug, Serialize)]
-pub struct Head {
-    /// Where it comes from.
+pub struct Origin {
+    /// Version, command, seed and scene.
     #[serde(flatten)]
     pub provenance: Provenance,
     /// The item.
     pub item: &'static str,
     /// What it reproduces.
     pub source: &'static str,
-    /// What the thesis says of the test case.
-    pub printed_setup: PrintedSetup,
     /// Threads.
     pub threads: usize,
+    /// All settings, with the most photons that were emitted at once.
+    pub settings: RenderSettings,
+    /// What was defined but odd.
+    pub warnings: Vec<String>,
+    /// The files, in the item's folder.
+    pub files: [String; 3],
+}
+
+impl Origin {
+    /// Of an item.
+    pub fn new(item: &'static str, source: &'static str, scene: &Scene, settings: &RenderSettings) -> Self {
+        Self {
+            provenance: Provenance::new(scene, settings.seed),
+            item,
+            source,
+            threads: rayon::current_num_threads(),
+            settings: settings.clone(),
+            warnings: scene.warnings.clone(),
+            files: ["png", "csv", "json"].map(|e| format!("{item}.{e}")),
+        }
+    }
+}
+
+/// The same with what the thesis says of its test case.
+#[derive(Clone, Debug, Serialize)]
+pub struct Head {
+    /// Where it comes from.
+    #[serde(flatten)]
+    pub origin: Origin,
+    /// What the thesis says of the test case.
+    pub printed_setup: PrintedSetup,
     /// Photons emitted.
     pub photons_emitted: u64,
     /// Photons stored.
     pub photons_stored: StoredCounts,
     /// Wall seconds of photons and maps.
     pub photon_seconds: f64,
-    /// All settings.
-    pub settings: RenderSettings,
-    /// What was defined but odd.
-    pub warnings: Vec<String>,
-    /// The files, in the item's folder.
-    pub files: [String; 3],
 }
 
 impl Head {
@@ -62,37 +86,31 @@ impl Head {
             caustic: stored.caustic.len() as u64,
             global: stored.global.len() as u64,
         };
-        let mut warnings = pass.scene.warnings.clone();
+        let mut origin = Origin::new(item, source, &pass.scene, &pass.settings);
         if photons_stored == StoredCounts::default() {
-            warnings.push(format!("none of {} photons was stored", pass.photons.emitted));
+            origin.warnings.push(format!("none of {} photons was stored", pass.photons.emitted));
         }
         Self {
-            provenance: Provenance::new(&pass.scene, pass.settings.seed),
-            item,
-            source,
+            origin,
             printed_setup: PrintedSetup {
                 stored_caustic: printed::STORED_CAUSTIC,
                 stored_global: printed::STORED_GLOBAL,
                 k: printed::K,
                 diff_smoothing: printed::DIFF_SMOOTHING,
             },
-            threads: rayon::current_num_threads(),
             photons_emitted: pass.photons.emitted,
             photons_stored,
             photon_seconds: case.photon_seconds,
-            settings: pass.settings.clone(),
-            warnings,
-            files: ["png", "csv", "json"].map(|e| format!("{item}.{e}")),
         }
     }
 
     /// The first line of the printed text.
     pub fn line(&self) -> String {
-        let s = &self.settings;
+        let s = &self.origin.settings;
         format!(
             "{} ({}): ring, {}x{}, {} photons emitted, {} caustic stored ({} in print), footprint scale {}, k = {}, seed {}\n\n",
-            self.item,
-            self.source,
+            self.origin.item,
+            self.origin.source,
             s.size[0],
             s.size[1],
             self.photons_emitted,
@@ -106,10 +124,10 @@ impl Head {
 
     /// The line below the title of a picture.
     pub fn subtitle(&self) -> String {
-        let s = &self.settings;
+        let s = &self.origin.settings;
         format!(
             "{}, {}x{} pixels, {} caustic photons stored, footprint scale {}, seed {}",
-            self.source, s.size[0], s.size[1], self.photons_stored.caustic, s.footprint_scale, s.seed
+            self.origin.source, s.size[0], s.size[1], self.photons_stored.caustic, s.footprint_scale, s.seed
         )
     }
 }
@@ -137,8 +155,8 @@ impl Done {
         report: &T,
         text: &str,
     ) -> Result<Self, Failure> {
-        let json = write_files(folder, &head.files, &head.provenance, picture, csv, report)?;
-        Ok(Self { json, text: head.line() + text, warnings: head.warnings.clone() })
+        let json = write_files(folder, &head.origin.files, &head.origin.provenance, picture, csv, report)?;
+        Ok(Self { json, text: head.line() + text, warnings: head.origin.warnings.clone() })
     }
 }
 

@@ -61,7 +61,7 @@ pub fn run(item: &'static str, flags: &PaperFlags, folder: &Path) -> Result<Done
     let text = format!(
         "{}\nseconds of the view pass alone, {} thread(s), the median of {} repeats in turn; ratios within a repeat, with the least and the largest\nprinted: the quotients of the seconds in {}\n",
         table(&rows),
-        head.threads,
+        head.origin.threads,
         flags.repeats(),
         printed::TABLE_1
     );
@@ -172,7 +172,7 @@ fn chart(rows: &[Timed], head: &Head) -> Chart {
     let colors = [PALETTE[7], PALETTE[0], PALETTE[1]];
     let legend = [
         "printed".to_owned(),
-        format!("measured, the {} nearest as published", head.settings.k),
+        format!("measured, the {} nearest as published", head.origin.settings.k),
         "measured, all that overlap".to_owned(),
     ];
     let mut bars = Vec::new();

@@ -83,12 +83,13 @@ impl Layer {
     /// As published each estimate is the mean of those of `finer` whose discs lie wholly in its own. Where the light changes
     /// towards an edge that moves it inwards, and from layer to layer light is lost or won. Corrected it is the mean of
     /// those that lie nearest to it: all layers have the same flux over the same area.
-    pub fn of_layer(finer: &Self, radius: f32, spacing: f32, how: Estimates) -> Self {
+    pub fn of_layer(finer: &Self, radius: f32, spacing: f32, as_published: bool) -> Self {
         let all = &finer.estimates;
         let kept = apart(&finer.tree, all.len(), spacing, |i| (all[i].position, all[i].normal));
-        let estimates: Vec<IrradianceEstimate> = match how {
-            Estimates::AsPublished => kept.par_iter().map(|&i| finer.mean_inside(&all[i as usize], radius)).collect(),
-            Estimates::Corrected(_) => finer.cell_means(&kept),
+        let estimates: Vec<IrradianceEstimate> = if as_published {
+            kept.par_iter().map(|&i| finer.mean_inside(&all[i as usize], radius)).collect()
+        } else {
+            finer.cell_means(&kept)
         };
         Self::new(radius, &estimates)
     }

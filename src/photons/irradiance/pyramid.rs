@@ -62,12 +62,13 @@ pub struct IrradiancePyramid {
 }
 
 impl IrradiancePyramid {
-    /// Makes the first layer of `photons`, and what comes above it when [`IrradiancePyramid::grow`] is called.
-    pub fn new(scene: &Scene, photons: &GlobalPhotons, settings: &PyramidSettings) -> Self {
+    /// Makes the first layer of `photons` on the surfaces of `areas`, and what comes above it when
+    /// [`IrradiancePyramid::grow`] is called.
+    pub fn new(areas: &SurfaceAreas, photons: &GlobalPhotons, settings: &PyramidSettings) -> Self {
         let start = Instant::now();
-        let radius = settings.radius.max(scene.resolution());
-        let areas = (!settings.as_published).then(|| SurfaceAreas::new(scene));
-        let first = Layer::of_photons(photons, radius, radius * PHOTON_SPACING, estimates(areas.as_ref()));
+        let radius = settings.radius.max(areas.scene().resolution());
+        let how = if settings.as_published { Estimates::AsPublished } else { Estimates::Corrected(areas) };
+        let first = Layer::of_photons(photons, radius, radius * PHOTON_SPACING, how);
         let bytes = first.bytes() as u64;
         let memory =
             PyramidMemory { photons: photons.bytes() as u64, peak: photons.bytes() as u64 + bytes, layers: bytes };
@@ -80,14 +81,13 @@ impl IrradiancePyramid {
     /// as the settings allow. The photons are not needed any more.
     pub fn grow(&mut self, scene: &Scene, settings: &PyramidSettings) {
         let start = Instant::now();
-        let areas = (!settings.as_published && settings.layers > 1).then(|| SurfaceAreas::new(scene));
         while let Some(last) = self.layers.last() {
             let radius = last.radius() * settings.growth;
             let ends = last.estimates().len() <= 1 || radius <= last.radius() || radius > scene.radius / 2.0;
             if ends || self.layers.len() >= settings.layers {
                 break;
             }
-            let next = Layer::of_layer(last, radius, last.radius() * ESTIMATE_SPACING, estimates(areas.as_ref()));
+            let next = Layer::of_layer(last, radius, last.radius() * ESTIMATE_SPACING, settings.as_published);
             self.memory.layers += next.bytes() as u64;
             self.layers.push(next);
         }
@@ -124,8 +124,4 @@ impl IrradiancePyramid {
         let place = libm::log2f(longest * self.share / first) / growth;
         Some(place.round().clamp(0.0, last) as usize)
     }
-}
-
-fn estimates<'a>(areas: Option<&'a SurfaceAreas<'a>>) -> Estimates<'a> {
-    areas.map_or(Estimates::AsPublished, Estimates::Corrected)
 }

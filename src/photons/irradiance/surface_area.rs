@@ -33,6 +33,11 @@ impl<'a> SurfaceAreas<'a> {
         Self { scene, tree, primitives }
     }
 
+    /// The scene.
+    pub fn scene(&self) -> &'a Scene {
+        self.scene
+    }
+
     /// Area of all of them, one side each, m².
     pub fn total(&self) -> f64 {
         let g = &self.scene.geometry;

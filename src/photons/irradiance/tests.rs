@@ -41,7 +41,7 @@ fn settings(radius: f32, as_published: bool) -> PyramidSettings {
 }
 
 fn pyramid(scene: &Scene, photons: &GlobalPhotons, settings: &PyramidSettings) -> IrradiancePyramid {
-    let mut pyramid = IrradiancePyramid::new(scene, photons, settings);
+    let mut pyramid = IrradiancePyramid::new(&SurfaceAreas::new(scene), photons, settings);
     pyramid.grow(scene, settings);
     pyramid
 }

@@ -1,6 +1,7 @@
 //! The inspector: why the pinned pixel has its value.
 
 pub mod hemisphere;
+pub mod listed;
 pub mod plane;
 pub mod rays;
 pub mod summary;

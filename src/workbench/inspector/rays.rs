@@ -1,5 +1,6 @@
 //! The gather rays of the inspected pixel as a table.
 
+use super::listed::{self, Picks};
 use super::{Inspected, Inspector, ListedRay};
 use crate::math::rgb::mean;
 use crate::render::inspect::gathering::{layer_of, semi_axes};
@@ -68,20 +69,10 @@ fn row(
 ) {
     let Some(ray) = gathering.ray(listed.at) else { return };
     let width: f32 = COLUMNS.iter().map(|c| c.1).sum();
-    let (rect, response) = ui.allocate_exact_size(vec2(width, ROW), Sense::click());
     let name = format!("gather ray {}", index + 1);
-    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, &name));
-    if response.hovered() {
-        inspector.hovered_ray = Some(index);
-    }
-    if response.clicked() {
-        inspector.chosen_ray = if inspector.chosen_ray == Some(index) { None } else { Some(index) };
-    }
-    if inspector.chosen_ray == Some(index) {
-        ui.painter().rect_filled(rect, 2.0, Color32::from_rgb(30, 70, 100));
-    } else if inspector.bright_ray() == Some(index) {
-        ui.painter().rect_filled(rect, 2.0, Color32::from_gray(64));
-    }
+    let bright = inspector.bright_ray();
+    let mut picks = Picks { hovered: &mut inspector.hovered_ray, chosen: &mut inspector.chosen_ray, bright };
+    let (rect, response) = listed::row(ui, vec2(width, ROW), &name, index, &mut picks);
     let dash = || "-".to_owned();
     let share = if total > 0.0 { 100.0 * listed.adds / total } else { 0.0 };
     let footprint = ray.hit.filter(|_| ray.radius > 0.0);
@@ -97,9 +88,7 @@ fn row(
     ];
     let mut left = rect.left();
     for (text, (_, width, _)) in cells.into_iter().zip(COLUMNS) {
-        let cell = Rect::from_min_size(pos2(left, rect.top()), vec2(width - 4.0, rect.height()));
-        let mut ui = ui.new_child(egui::UiBuilder::new().max_rect(cell).layout(Layout::top_down(Align::Max)));
-        ui.add(egui::Label::new(mono(text).size(11.0)).truncate().selectable(false));
+        listed::cell(ui, rect, left, width, Align::Max, text);
         left += width;
     }
     response.on_hover_text(tip(ray, found));

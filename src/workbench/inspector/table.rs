@@ -1,12 +1,13 @@
 //! The photons of the inspected pixel as a table.
 
+use super::listed::{self, Picks};
 use super::summary::situation_tip;
 use super::{Column, Inspected, Inspector};
 use crate::estimate::registry::short_name;
 use crate::math::rgb::mean;
 use crate::render::inspect::PhotonRow;
 use crate::workbench::theme::{mono, number};
-use egui::{Align, Color32, Layout, Rect, Sense, Ui, pos2, vec2};
+use egui::{Align, Color32, Ui, vec2};
 use std::cmp::Ordering;
 
 const ROW: f32 = 17.0;
@@ -92,21 +93,10 @@ pub fn show(ui: &mut Ui, inspector: &mut Inspector, found: &Inspected, colors: &
 
 fn row(ui: &mut Ui, inspector: &mut Inspector, row: &PhotonRow, index: usize, columns: &[(Column, String, f32, &str)]) {
     let width: f32 = columns.iter().map(|c| c.2).sum();
-    let (rect, response) = ui.allocate_exact_size(vec2(width, ROW + 3.0), Sense::click());
-    response.widget_info(|| {
-        egui::WidgetInfo::labeled(egui::Role::Button, true, format!("photon {} {}", row.kind.name(), row.index))
-    });
-    if response.hovered() {
-        inspector.hovered = Some(index);
-    }
-    if response.clicked() {
-        inspector.chosen = if inspector.chosen == Some(index) { None } else { Some(index) };
-    }
-    if inspector.chosen == Some(index) {
-        ui.painter().rect_filled(rect, 2.0, Color32::from_rgb(30, 70, 100));
-    } else if inspector.bright() == Some(index) {
-        ui.painter().rect_filled(rect, 2.0, Color32::from_gray(64));
-    }
+    let name = format!("photon {} {}", row.kind.name(), row.index);
+    let bright = inspector.bright();
+    let mut picks = Picks { hovered: &mut inspector.hovered, chosen: &mut inspector.chosen, bright };
+    let (rect, response) = listed::row(ui, vec2(width, ROW + 3.0), &name, index, &mut picks);
     let mut left = rect.left();
     for (column, _, width, _) in columns {
         let text = match column {
@@ -117,11 +107,8 @@ fn row(ui: &mut Ui, inspector: &mut Inspector, row: &PhotonRow, index: usize, co
             Column::Situation => row.situation.letter().into(),
             Column::Weight(e) => number(row.weights.get(*e).copied().unwrap_or(0.0)),
         };
-        let cell = Rect::from_min_size(pos2(left, rect.top()), vec2(*width - 4.0, rect.height()));
         let align = if *column == Column::Photon { Align::Min } else { Align::Max };
-        let layout = Layout::top_down(align);
-        let mut ui = ui.new_child(egui::UiBuilder::new().max_rect(cell).layout(layout));
-        ui.add(egui::Label::new(mono(text).size(11.0)).truncate().selectable(false));
+        listed::cell(ui, rect, left, *width, align, text);
         left += width;
     }
     response.on_hover_text(format!(

@@ -12,6 +12,7 @@ use crate::cli::table::Table;
 use crate::export::text::{Canvas, Face};
 use crate::photons::PhotonKind;
 use crate::photons::irradiance::pyramid::{ESTIMATE_SPACING, PHOTON_SPACING};
+use crate::photons::irradiance::surface_area::SurfaceAreas;
 use crate::photons::irradiance::{GlobalPhotons, IrradiancePyramid, Layer, PyramidSettings};
 use crate::render::stats::StoredCounts;
 use crate::scene::Scene;
@@ -96,7 +97,7 @@ pub fn run(item: &'static str, flags: &PaperFlags, folder: &Path) -> Result<Done
     }
     let photons = GlobalPhotons::new(&stored, &PhotonKind::ALL);
     let wanted = PyramidSettings { radius: RADIUS, growth: GROWTH, as_published: true, layers: 2 };
-    let mut pyramid = IrradiancePyramid::new(&scene, &photons, &wanted);
+    let mut pyramid = IrradiancePyramid::new(&SurfaceAreas::new(&scene), &photons, &wanted);
     pyramid.grow(&scene, &wanted);
     let of_layer = |l: &Layer| on_piece(&scene, l.estimates().iter().map(|e| (e.position, e.normal)));
     let own = on_piece(&scene, photons.photons().iter().map(|p| (p.position, p.normal)));
