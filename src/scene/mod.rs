@@ -11,6 +11,7 @@ pub mod load;
 pub mod locate;
 pub mod material;
 pub mod memory;
+pub mod motion;
 pub mod obj;
 pub mod scene_file;
 pub mod shapes;
@@ -22,10 +23,11 @@ pub use error::SceneError;
 pub use geometry::Geometry;
 pub use light::Light;
 pub use material::Material;
+pub use motion::Motion;
 pub use source::{Source, open};
 
 use glam::DVec3;
-use scene_file::RenderFile;
+use scene_file::{RealtimeFile, RenderFile};
 use std::sync::Arc;
 
 /// Everything that is lit, in metres about a local origin.
@@ -53,6 +55,12 @@ pub struct Scene {
     pub render: RenderFile,
     /// The file, or the built-in's name with `.toml`, and the line of each key of `[render]`.
     pub render_lines: (std::path::PathBuf, std::collections::BTreeMap<String, usize>),
+    /// The `[realtime]` table as it was written.
+    pub realtime: RealtimeFile,
+    /// Where the keys of `[realtime]` stand, as in `render_lines`.
+    pub realtime_lines: (std::path::PathBuf, std::collections::BTreeMap<String, usize>),
+    /// What moves in real-time rendering; everything else renders it where the file has it.
+    pub motions: Vec<Motion>,
     /// What was defined but odd, one line each.
     pub warnings: Vec<String>,
 }

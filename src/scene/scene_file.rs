@@ -25,6 +25,9 @@ pub struct SceneFile {
     /// Settings that the scene asks for.
     #[serde(default)]
     pub render: RenderFile,
+    /// Settings of real-time rendering.
+    #[serde(default, skip_serializing_if = "RealtimeFile::is_empty")]
+    pub realtime: RealtimeFile,
 }
 
 /// `[camera]`.
@@ -231,4 +234,110 @@ pub struct RenderFile {
     /// polar or as_published.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub diffuse_spread: Option<String>,
+}
+
+/// `[realtime]`: parameters of real-time photon mapping (Kristensen and Ottosen 2003, chapter 6), and ours.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct RealtimeFile {
+    /// Whether rays go through a hierarchy; otherwise they try every surface.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub acceleration: Option<bool>,
+    /// Triangles by which the mesh that carries irradiance is refined.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mesh_refinement: Option<i64>,
+    /// Longest edge of that mesh, m; refinement ends where it is reached.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub max_edge: Option<f64>,
+    /// Whether a vertex is estimated once a frame, or for each visible triangle that it is a corner of.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub estimate_cache: Option<bool>,
+    /// Photons of an irradiance estimate at most.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub max_search_count: Option<i64>,
+    /// How far an irradiance estimate looks, m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub max_search_radius: Option<f64>,
+    /// Whether the radius follows from the photon map instead.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub radius_heuristic: Option<bool>,
+    /// Share α of the mean radiance at which that radius is reached.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub radius_alpha: Option<f64>,
+    /// Whether photons off the vertex's plane are left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sphere_slice: Option<bool>,
+    /// Whether vertices gather finally.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub final_gathering: Option<bool>,
+    /// Rays of a final gathering.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub final_gathering_rays: Option<i64>,
+    /// Photons that all lights together emit in a frame.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub photons_from_light: Option<i64>,
+    /// Frames whose photons make the map.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub accumulation_frames: Option<i64>,
+    /// Whether photons are stored where they arrive from the light.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub store_direct_light: Option<bool>,
+    /// Diffuse reflections of a photon at most.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub recursion_depth: Option<i64>,
+    /// Photons into which a reflected one is split.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub diffuse_reflections: Option<i64>,
+    /// Photons stored for each that arrives.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub snowball_size: Option<i64>,
+    /// rejection, explicit, saff_kuijlaars, spiral, stratified or sobol.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub light_distribution: Option<String>,
+    /// The same for reflections.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub diffuse_distribution: Option<String>,
+    /// splitting or roulette.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub scattering: Option<String>,
+    /// Whether frames use the same random numbers.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub coherent: Option<bool>,
+    /// sphere, cylinder or ellipsoid.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub search: Option<String>,
+    /// Whether photons that arrive at the vertex's back are left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub incoming_direction: Option<bool>,
+    /// Half-height of slice, cylinder and ellipsoid over the radius of the search.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub slice_height: Option<f64>,
+    /// disc, hull, hull_as_published, circle, aligned_box, oriented_box or ellipse.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub area: Option<String>,
+    /// none, normal or cell: how photons are split into maps.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub partition: Option<String>,
+    /// Photons in a leaf of the kd-tree at most.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub stop_recursion_size: Option<i64>,
+    /// instances or rebuild: how the hierarchy follows what moves.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub moving: Option<String>,
+    /// multiply or offset.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub blending: Option<String>,
+    /// Whether triangles seen from behind are left out of the picture.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub cull_back_faces: Option<bool>,
+    /// Whether a spot light at the camera takes the place of the lights.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub flashlight: Option<bool>,
+}
+
+impl RealtimeFile {
+    /// Whether no key is given.
+    pub fn is_empty(&self) -> bool {
+        *self == Self::default()
+    }
 }

@@ -34,6 +34,9 @@ pub fn scene(geometry: Geometry, material: Material, radius: f32) -> Scene {
         lights: Vec::new(),
         render: RenderFile::default(),
         render_lines: Default::default(),
+        realtime: Default::default(),
+        realtime_lines: Default::default(),
+        motions: Vec::new(),
         warnings: Vec::new(),
     }
 }

@@ -2,8 +2,7 @@
 
 use crate::math::frame::unit;
 use crate::math::rgb::Rgb;
-use crate::scene::Camera;
-use crate::scene::Material;
+use crate::scene::{Camera, Material, Motion};
 use crate::scene::geometry::{Geometry, NONE, Sphere};
 use crate::scene::shapes::Mesh;
 use glam::{DVec3, Vec3};
@@ -78,9 +77,31 @@ pub(super) struct Assembly {
     pub(super) spheres: Vec<(DVec3, f64, u32)>,
     /// Each with the key that it came from.
     pub(super) lights: Vec<(String, LightSource)>,
+    /// What moves in real-time rendering.
+    pub(super) moving: Vec<Moving>,
+}
+
+/// How many triangles, spheres and lights there are.
+#[derive(Clone, Copy)]
+pub(super) struct Extent {
+    triangles: usize,
+    spheres: usize,
+    lights: usize,
+}
+
+/// What came in between two extents, and its path.
+pub(super) struct Moving {
+    pub(super) from: Extent,
+    pub(super) to: Extent,
+    pub(super) path: Vec<DVec3>,
+    pub(super) period: f64,
 }
 
 impl Assembly {
+    pub(super) fn extent(&self) -> Extent {
+        Extent { triangles: self.mesh.triangles.len(), spheres: self.spheres.len(), lights: self.lights.len() }
+    }
+
     pub(super) fn add_mesh(&mut self, mesh: Mesh, material: impl Fn(u32) -> u32) {
         let (p, n, t) = (self.mesh.positions.len() as u32, self.mesh.normals.len() as u32, self.mesh.uvs.len() as u32);
         let shift = |i: [u32; 3], by: u32| i.map(|i| if i == NONE { NONE } else { i + by });
@@ -141,7 +162,9 @@ fn is_crowded(triangles: &[[u32; 3]], positions: &[Vec3]) -> bool {
 
 /// Moves the assembly to the local origin, in f32, without its triangles and spheres that have no area. Where many
 /// triangles are the same the first alone is kept, which is the one that rays meet.
-pub(super) fn local_geometry(assembly: &Assembly, origin: DVec3, radius: f64) -> Geometry {
+///
+/// What moves is told by where it comes to lie.
+pub(super) fn local_geometry(assembly: &Assembly, origin: DVec3, radius: f64) -> (Geometry, Vec<Motion>) {
     let mesh = &assembly.mesh;
     let mut g = Geometry {
         positions: mesh.positions.iter().map(|&p| (p - origin).as_vec3()).collect(),
@@ -158,7 +181,12 @@ pub(super) fn local_geometry(assembly: &Assembly, origin: DVec3, radius: f64) ->
     g.zero_area = assembly.spheres.len() - g.spheres.len();
     let smallest = radius * radius * (SMALLEST * SMALLEST);
     let mut places = is_crowded(&mesh.triangles, &g.positions).then(HashSet::new);
+    // Triangles and spheres that are kept of the first `i`, where something moves.
+    let mut kept = Vec::new();
     for (i, t) in mesh.triangles.iter().enumerate() {
+        if !assembly.moving.is_empty() {
+            kept.push(g.triangles.len() as u32);
+        }
         let [a, b, c] = t.map(|i| mesh.positions[i as usize]);
         if (b - a).cross(c - a).length() <= smallest {
             g.zero_area += 1;
@@ -173,5 +201,17 @@ pub(super) fn local_geometry(assembly: &Assembly, origin: DVec3, radius: f64) ->
         g.corner_uvs.push(mesh.corner_uvs[i]);
         g.triangle_materials.push(mesh.materials[i]);
     }
-    g
+    kept.push(g.triangles.len() as u32);
+    let spheres = |before: usize| {
+        assembly.spheres[..before].iter().filter(|(_, r, _)| *r > radius * SMALLEST).count() as u32
+    };
+    let motions = assembly.moving.iter().map(|m| Motion {
+        triangles: kept[m.from.triangles]..kept[m.to.triangles],
+        spheres: spheres(m.from.spheres)..spheres(m.to.spheres),
+        lights: (m.from.lights as u32..m.to.lights as u32).collect(),
+        path: m.path.clone(),
+        period: m.period,
+    });
+    let motions = motions.collect();
+    (g, motions)
 }

@@ -39,7 +39,6 @@ impl Loader<'_> {
                 ("irradiance", l.irradiance.is_some()),
             ],
         )?;
-        self.animation(key, l.animate.as_ref())?;
         let place = |name: &str, value: Option<[f64; 3]>| -> Checked<DVec3> {
             self.vector(&at(name), self.required(key, name, value)?)
         };

@@ -11,10 +11,10 @@ use crate::scene::geometry::BYTES_PER_TRIANGLE as TRIANGLE_BYTES;
 use crate::scene::geometry::BYTES_PER_VERTEX as VERTEX_BYTES;
 use crate::scene::locate::Locator;
 use crate::scene::memory;
-use crate::scene::scene_file::{AnimateFile, CameraFile, LightFile, RenderFile, SceneFile, ShapeFile};
+use crate::scene::scene_file::{AnimateFile, CameraFile, LightFile, RealtimeFile, RenderFile, SceneFile, ShapeFile};
 use crate::scene::source::{Files, hash_of};
 use crate::scene::{Camera, Light, Scene, SceneError};
-use assembly::{Assembly, CameraSource, LightSource, local_geometry};
+use assembly::{Assembly, CameraSource, Extent, LightSource, Moving, local_geometry};
 use glam::DVec3;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -66,17 +66,21 @@ pub fn scene_from_file(file: &Path, text: &str, parsed: &SceneFile, files: &File
     loader.foresee(&parsed.shapes, &parsed.lights)?;
     loader.materials(&parsed.materials)?;
     for (i, shape) in parsed.shapes.iter().enumerate() {
-        loader.shape(&format!("shapes[{i}]"), shape)?;
+        let (key, before) = (format!("shapes[{i}]"), loader.assembly.extent());
+        loader.shape(&key, shape)?;
+        loader.animate(&key, shape.animate.as_ref(), before)?;
     }
     for (i, light) in parsed.lights.iter().enumerate() {
-        loader.light(&format!("lights[{i}]"), light)?;
+        let (key, before) = (format!("lights[{i}]"), loader.assembly.extent());
+        loader.light(&key, light)?;
+        loader.animate(&key, light.animate.as_ref(), before)?;
     }
     let Some(camera) = &parsed.camera else {
         return Err(loader.locator.error("camera", "there is none; add [camera] with position, target and fov_y"));
     };
     let camera = loader.camera(camera)?;
     let name = parsed.name.clone().unwrap_or_else(|| stem(file));
-    loader.finish(name, &camera, parsed.render.clone())
+    loader.finish(name, &camera, parsed.render.clone(), parsed.realtime.clone())
 }
 
 /// The camera of a scene file, about a local origin that is known.
@@ -125,8 +129,9 @@ pub fn scene_from_obj(file: &Path, text: &str, files: &Files) -> Checked<(SceneF
         shapes: vec![shape],
         lights: vec![light],
         render: RenderFile::default(),
+        realtime: RealtimeFile::default(),
     };
-    loader.finish(stem(file), &source, RenderFile::default()).map(|scene| (written, scene))
+    loader.finish(stem(file), &source, RenderFile::default(), RealtimeFile::default()).map(|scene| (written, scene))
 }
 
 fn stem(file: &Path) -> String {
@@ -241,12 +246,15 @@ impl<'a> Loader<'a> {
         }
     }
 
-    fn animation(&self, key: &str, a: Option<&AnimateFile>) -> Checked<()> {
+    /// Takes note that what has come in since `before` moves.
+    fn animate(&mut self, key: &str, a: Option<&AnimateFile>, before: Extent) -> Checked<()> {
         let Some(a) = a else { return Ok(()) };
+        let mut path = Vec::with_capacity(a.path.len());
         for (i, p) in a.path.iter().enumerate() {
-            self.vector(&format!("{key}.animate.path[{i}]"), *p)?;
+            path.push(self.vector(&format!("{key}.animate.path[{i}]"), *p)?);
         }
-        self.positive(&format!("{key}.animate.period"), a.period, "seconds")?;
+        let period = self.positive(&format!("{key}.animate.period"), a.period, "seconds")?;
+        self.assembly.moving.push(Moving { from: before, to: self.assembly.extent(), path, period });
         Ok(())
     }
 
@@ -304,7 +312,13 @@ impl<'a> Loader<'a> {
         Ok(())
     }
 
-    fn finish(mut self, name: String, camera: &CameraSource, render: RenderFile) -> Checked<Scene> {
+    fn finish(
+        mut self,
+        name: String,
+        camera: &CameraSource,
+        render: RenderFile,
+        realtime: RealtimeFile,
+    ) -> Checked<Scene> {
         let (origin, radius) = self.assembly.bounds();
         if !RADIUS.contains(&radius) {
             let what = format!(
@@ -315,7 +329,7 @@ impl<'a> Loader<'a> {
             return self.wrong("shapes", what);
         }
         let local = |p: DVec3| (p - origin).as_vec3();
-        let geometry = local_geometry(&self.assembly, origin, radius);
+        let (geometry, motions) = local_geometry(&self.assembly, origin, radius);
         if geometry.primitive_count() == 0 {
             self.warnings.push("the scene has no surfaces".into());
         }
@@ -373,6 +387,9 @@ impl<'a> Loader<'a> {
             material_names: self.assembly.material_names,
             render,
             render_lines: self.locator.lines_of("render"),
+            realtime,
+            realtime_lines: self.locator.lines_of("realtime"),
+            motions,
             warnings: self.warnings,
         })
     }

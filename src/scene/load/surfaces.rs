@@ -90,7 +90,6 @@ impl Loader<'_> {
                 ("segments", s.segments.is_some()),
             ],
         )?;
-        self.animation(key, s.animate.as_ref())?;
         let place = self.placement(key, s)?;
         let material = match &s.material {
             Some(name) => match self.material_index.get(name) {
