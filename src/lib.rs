@@ -9,6 +9,7 @@ pub mod estimate;
 pub mod final_gather;
 pub mod math;
 pub mod photons;
+pub mod realtime;
 pub mod render;
 pub mod scene;
 pub mod trace;

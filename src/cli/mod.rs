@@ -12,6 +12,7 @@ mod inspect_text;
 pub mod lists;
 pub mod paper;
 pub mod progress;
+pub mod realtime;
 pub mod render;
 pub mod shot;
 pub mod stress;
@@ -51,6 +52,8 @@ enum Command {
     Study(study::StudyArgs),
     /// The shards of a study as one
     Merge(study::merge::MergeArgs),
+    /// Real-time photon mapping without a window: frame rate, renewal time, fluctuation
+    Realtime(realtime::RealtimeArgs),
     /// The stability cases: worst errors of kernels and renders on stiff and extreme input; exit 1 if one fails
     Stress(stress::StressArgs),
     /// A figure or table of the papers, reproduced
@@ -85,6 +88,7 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
         Some(Command::Diff(args)) => diff::run(&args),
         Some(Command::Study(args)) => study::run(&args),
         Some(Command::Merge(args)) => study::merge::run(&args),
+        Some(Command::Realtime(args)) => realtime::run_realtime(&args),
         Some(Command::Stress(args)) => stress::run(&args),
         Some(Command::Paper(args)) => paper::run(&args),
         Some(Command::Shot(args)) => shot::run(&args),

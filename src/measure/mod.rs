@@ -5,6 +5,7 @@ pub mod exr_header;
 pub mod flip;
 pub mod image_file;
 pub mod metrics;
+pub mod realtime;
 pub mod reference;
 pub mod stability;
 pub mod study;

@@ -51,6 +51,42 @@ pub struct NearestQuery {
     pub slice: f32,
 }
 
+/// A region about a centre in which photons are looked for, and the distance by which the nearest are chosen in it.
+pub trait Volume {
+    /// Squared distance of an offset from the centre, metres²; infinite outside of the region whatever its size.
+    fn squared(&self, offset: Vec3) -> f32;
+    /// Squared radius of a ball that holds all offsets of a squared distance up to `squared`.
+    fn reach(&self, squared: f32) -> f32;
+}
+
+/// A ball, or the slice of it about a plane through its centre (Kristensen and Ottosen 2003, figure 3.8).
+#[derive(Clone, Copy, Debug)]
+pub struct Slice {
+    /// Unit normal of the plane.
+    pub normal: Vec3,
+    /// Half-height, metres; infinite for the whole ball.
+    pub height: f32,
+}
+
+impl Volume for Slice {
+    #[inline]
+    fn squared(&self, offset: Vec3) -> f32 {
+        // Not over the height: an infinite one holds what is no number too.
+        if offset.dot(self.normal).abs() > self.height { f32::INFINITY } else { squared(offset) }
+    }
+
+    #[inline]
+    fn reach(&self, squared: f32) -> f32 {
+        squared
+    }
+}
+
+/// Squared length, its terms summed in order.
+#[inline]
+fn squared(offset: Vec3) -> f32 {
+    offset.x * offset.x + offset.y * offset.y + offset.z * offset.z
+}
+
 /// The photons found so far: the farthest on top.
 ///
 /// Distances are squared and kept as the bits of a non-negative f32, whose order is that of the numbers; equal
@@ -60,10 +96,17 @@ pub type Nearest = BinaryHeap<(u32, u32)>;
 impl KdTree {
     /// Builds over positions; entry `i` is reported as index `i`. The tree does not depend on the number of threads.
     pub fn new(positions: impl Iterator<Item = Vec3>) -> Self {
+        Self::with_leaves(positions, LEAF)
+    }
+
+    /// The same with leaves of `leaf` entries at most, one or more. What a query finds does not depend on it.
+    pub fn with_leaves(positions: impl Iterator<Item = Vec3>, leaf: usize) -> Self {
+        let leaf = leaf.max(1);
         let mut entries: Vec<(Vec3, u32)> = positions.zip(0u32..).collect();
-        let mut nodes = vec![Node { split: 0.0, axis: IS_LEAF, start: 0, count: 0 }; node_count(entries.len())];
+        let count = node_count(entries.len(), leaf);
+        let mut nodes = vec![Node { split: 0.0, axis: IS_LEAF, start: 0, count: 0 }; count];
         if !entries.is_empty() {
-            build(&mut entries, &mut nodes, 0, 0);
+            build(&mut entries, &mut nodes, 0, 0, leaf);
         }
         Self {
             nodes,
@@ -76,14 +119,36 @@ impl KdTree {
 
     /// Fills `found` with the `k` nearest entries in the query's sphere and slice that `accept` takes.
     pub fn nearest(&self, query: &NearestQuery, found: &mut Nearest, accept: impl Fn(u32) -> bool) {
+        let slice = Slice { normal: query.normal, height: query.slice };
         found.clear();
-        if self.nodes.is_empty() || query.k == 0 {
+        self.add_nearest(0, query.center, query.radius * query.radius, query.k, &slice, found, accept);
+    }
+
+    /// Adds to `found` what is among the `k` nearest entries about `center` by the distance of `volume`, up to the squared
+    /// distance `limit`, of those that `accept` takes and those that are there already. Entry `i` is put in as `first + i`.
+    #[expect(clippy::too_many_arguments, reason = "a query in parts, of which callers have some alone")]
+    pub fn add_nearest(
+        &self,
+        first: u32,
+        center: Vec3,
+        limit: f32,
+        k: usize,
+        volume: &impl Volume,
+        found: &mut Nearest,
+        accept: impl Fn(u32) -> bool,
+    ) {
+        if self.nodes.is_empty() || k == 0 {
             return;
         }
-        self.cells(query.center, (query.radius * query.radius).min(f32::MAX), |node, limit| {
-            let mut worst = limit;
-            self.scan(node, query, &mut worst, found, &accept);
-            worst
+        let mut worst = limit.min(f32::MAX);
+        if found.len() == k
+            && let Some(farthest) = found.peek()
+        {
+            worst = worst.min(f32::from_bits(farthest.0));
+        }
+        self.cells(center, volume.reach(worst).min(f32::MAX), |node, _| {
+            self.scan(node, first, center, k, volume, &mut worst, found, &accept);
+            volume.reach(worst).min(f32::MAX)
         });
     }
 
@@ -106,15 +171,16 @@ impl KdTree {
             let range = node.start as usize..(node.start + node.count) as usize;
             let (xs, ys, zs) = (&self.xs[range.clone()], &self.ys[range.clone()], &self.zs[range.clone()]);
             let index = &self.index[range];
-            // All distances of a leaf first, for the processor's wide instructions.
-            let mut squared = [0.0f32; LEAF];
-            for i in 0..xs.len() {
-                let (x, y, z) = (xs[i] - center.x, ys[i] - center.y, zs[i] - center.z);
-                squared[i] = x * x + y * y + z * z;
-            }
-            for i in 0..index.len() {
-                if squared[i] <= limit {
-                    visit(index[i], Vec3::new(xs[i] - center.x, ys[i] - center.y, zs[i] - center.z));
+            for start in (0..xs.len()).step_by(LEAF) {
+                // All distances of a leaf first, for the processor's wide instructions.
+                let (mut distances, end) = ([0.0f32; LEAF], (start + LEAF).min(xs.len()));
+                for i in start..end {
+                    distances[i - start] = squared(Vec3::new(xs[i] - center.x, ys[i] - center.y, zs[i] - center.z));
+                }
+                for i in start..end {
+                    if distances[i - start] <= limit {
+                        visit(index[i], Vec3::new(xs[i] - center.x, ys[i] - center.y, zs[i] - center.z));
+                    }
                 }
             }
             limit
@@ -183,53 +249,56 @@ impl KdTree {
     }
 
     #[inline]
+    #[expect(clippy::too_many_arguments, reason = "the state of one query, in the loop that all time goes into")]
     fn scan(
         &self,
         node: Node,
-        query: &NearestQuery,
+        first: u32,
+        center: Vec3,
+        k: usize,
+        volume: &impl Volume,
         worst: &mut f32,
         found: &mut Nearest,
         accept: &impl Fn(u32) -> bool,
     ) {
         let range = node.start as usize..(node.start + node.count) as usize;
         let (xs, ys, zs) = (&self.xs[range.clone()], &self.ys[range.clone()], &self.zs[range.clone()]);
-        let mut squared = [0.0f32; LEAF];
-        for i in 0..xs.len() {
-            let (x, y, z) = (xs[i] - query.center.x, ys[i] - query.center.y, zs[i] - query.center.z);
-            squared[i] = x * x + y * y + z * z;
-        }
-        for i in 0..xs.len() {
-            if squared[i] > *worst {
-                continue;
+        for start in (0..xs.len()).step_by(LEAF) {
+            let (mut distances, end) = ([0.0f32; LEAF], (start + LEAF).min(xs.len()));
+            for i in start..end {
+                distances[i - start] = volume.squared(Vec3::new(xs[i] - center.x, ys[i] - center.y, zs[i] - center.z));
             }
-            let offset = Vec3::new(xs[i], ys[i], zs[i]) - query.center;
-            let index = self.index[range.start + i];
-            if offset.dot(query.normal).abs() > query.slice || !accept(index) {
-                continue;
-            }
-            let entry = (squared[i].to_bits(), index);
-            if found.len() < query.k {
-                found.push(entry);
-            } else if let Some(mut farthest) = found.peek_mut()
-                && entry < *farthest
-            {
-                *farthest = entry;
-            }
-            if found.len() == query.k
-                && let Some(farthest) = found.peek()
-            {
-                *worst = worst.min(f32::from_bits(farthest.0));
+            for i in start..end {
+                // What is no number is not near.
+                let near = distances[i - start] <= *worst;
+                let index = self.index[range.start + i];
+                if !(near && accept(index)) {
+                    continue;
+                }
+                let entry = (distances[i - start].to_bits(), first + index);
+                if found.len() < k {
+                    found.push(entry);
+                } else if let Some(mut farthest) = found.peek_mut()
+                    && entry < *farthest
+                {
+                    *farthest = entry;
+                }
+                if found.len() == k
+                    && let Some(farthest) = found.peek()
+                {
+                    *worst = worst.min(f32::from_bits(farthest.0));
+                }
             }
         }
     }
 }
 
 /// Nodes of a tree over so many entries.
-fn node_count(entries: usize) -> usize {
+fn node_count(entries: usize, leaf: usize) -> usize {
     match entries {
         0 => 0,
-        1..=LEAF => 1,
-        n => 1 + node_count(n / 2) + node_count(n - n / 2),
+        n if n <= leaf => 1,
+        n => 1 + node_count(n / 2, leaf) + node_count(n - n / 2, leaf),
     }
 }
 
@@ -238,10 +307,10 @@ const PARALLEL: usize = 1 << 13;
 
 /// Orders `entries` and fills `nodes`, of which there are [`node_count`]; the first ones of each lie at `first_entry` and
 /// `first_node` of the whole tree.
-fn build(entries: &mut [(Vec3, u32)], nodes: &mut [Node], first_entry: u32, first_node: u32) {
+fn build(entries: &mut [(Vec3, u32)], nodes: &mut [Node], first_entry: u32, first_node: u32, leaf: usize) {
     // There is a node where there is an entry.
     let Some((node, rest)) = nodes.split_first_mut() else { return };
-    if entries.len() <= LEAF {
+    if entries.len() <= leaf {
         *node = Node { split: 0.0, axis: IS_LEAF, start: first_entry, count: entries.len() as u32 };
         return;
     }
@@ -260,11 +329,11 @@ fn build(entries: &mut [(Vec3, u32)], nodes: &mut [Node], first_entry: u32, firs
     let split = entries[middle].0[axis];
     let parallel = entries.len() >= PARALLEL;
     let (left, right) = entries.split_at_mut(middle);
-    let (left_nodes, right_nodes) = rest.split_at_mut(node_count(middle));
+    let (left_nodes, right_nodes) = rest.split_at_mut(node_count(middle, leaf));
     let right_child = first_node + 1 + left_nodes.len() as u32;
     *node = Node { split, axis: axis as u32, start: right_child, count: 0 };
-    let mut build_left = || build(left, left_nodes, first_entry, first_node + 1);
-    let mut build_right = || build(right, right_nodes, first_entry + middle as u32, right_child);
+    let mut build_left = || build(left, left_nodes, first_entry, first_node + 1, leaf);
+    let mut build_right = || build(right, right_nodes, first_entry + middle as u32, right_child, leaf);
     if parallel {
         rayon::join(build_left, build_right);
     } else {
@@ -336,7 +405,7 @@ mod tests {
         for (c, cloud) in clouds.into_iter().enumerate() {
             for n in [0usize, 1, 2, 13, 1000] {
                 let points: Vec<Vec3> = (0..n).map(|i| cloud(sequence.four(i as u64, c as u32))).collect();
-                let tree = KdTree::new(points.iter().copied());
+                let tree = KdTree::with_leaves(points.iter().copied(), [12, 1, 30][n % 3]);
                 let mut found = Nearest::new();
                 for q in 0..60u64 {
                     let x = sequence.four(q, 100);

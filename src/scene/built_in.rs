@@ -81,6 +81,16 @@ pub const BUILT_IN: &[BuiltIn] = &[
         files: &[("prism.obj", include_str!("../../assets/scenes/prism.obj"))],
         reference: None,
     },
+    BuiltIn {
+        name: "rooms",
+        purpose: "five rooms with a moving light and a moving box: for real-time photon mapping",
+        text: include_str!("../../assets/scenes/rooms.toml"),
+        files: &[
+            ("rooms.obj", include_str!("../../assets/scenes/rooms.obj")),
+            ("rooms.mtl", include_str!("../../assets/scenes/rooms.mtl")),
+        ],
+        reference: None,
+    },
 ];
 
 /// The built-in scene of that name.

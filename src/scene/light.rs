@@ -88,6 +88,20 @@ impl Light {
         Self::Mesh { triangles: kept, cumulative_area, radiance }
     }
 
+    /// The same light at another place; parallel light is everywhere.
+    pub fn moved(&self, by: Vec3) -> Self {
+        let mut light = self.clone();
+        match &mut light {
+            Self::Point { position: p, .. }
+            | Self::Spot { position: p, .. }
+            | Self::Sphere { center: p, .. }
+            | Self::Quad { center: p, .. } => *p += by,
+            Self::Mesh { triangles, .. } => triangles.iter_mut().flatten().for_each(|p| *p += by),
+            Self::Directional { .. } => {}
+        }
+        light
+    }
+
     /// Radiant flux Φ per channel, W.
     pub fn flux(&self) -> Rgb {
         match self {

@@ -19,6 +19,9 @@ pub struct Differential {
 }
 
 impl Differential {
+    /// That of a ray which carries none.
+    pub const NONE: Self = Self { dp: [Vec3::ZERO; 2], dv: [Vec3::ZERO; 2] };
+
     /// Whether nothing changes with the parameters: a ray that carries no differential.
     pub fn is_none(&self) -> bool {
         *self == Self::default()

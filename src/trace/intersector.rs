@@ -191,8 +191,8 @@ impl Start {
     }
 }
 
-/// Distance to a sphere from outside or inside; f64, because the discriminant cancels.
-fn sphere(ray: &Ray, center: Vec3, radius: f32, t_max: f32) -> Option<f32> {
+/// Distance to a sphere from outside or inside, in `(0, t_max]`; f64, because the discriminant cancels.
+pub fn sphere(ray: &Ray, center: Vec3, radius: f32, t_max: f32) -> Option<f32> {
     let d = ray.direction.as_dvec3();
     let o = ray.origin.as_dvec3() - center.as_dvec3();
     let a = d.length_squared();

@@ -2,9 +2,9 @@
 
 use crate::math::frame::unit;
 use crate::math::rgb::Rgb;
-use crate::scene::{Camera, Material, Motion};
 use crate::scene::geometry::{Geometry, NONE, Sphere};
 use crate::scene::shapes::Mesh;
+use crate::scene::{Camera, Material, Motion};
 use glam::{DVec3, Vec3};
 use std::collections::HashSet;
 
@@ -202,9 +202,8 @@ pub(super) fn local_geometry(assembly: &Assembly, origin: DVec3, radius: f64) ->
         g.triangle_materials.push(mesh.materials[i]);
     }
     kept.push(g.triangles.len() as u32);
-    let spheres = |before: usize| {
-        assembly.spheres[..before].iter().filter(|(_, r, _)| *r > radius * SMALLEST).count() as u32
-    };
+    let spheres =
+        |before: usize| assembly.spheres[..before].iter().filter(|(_, r, _)| *r > radius * SMALLEST).count() as u32;
     let motions = assembly.moving.iter().map(|m| Motion {
         triangles: kept[m.from.triangles]..kept[m.to.triangles],
         spheres: spheres(m.from.spheres)..spheres(m.to.spheres),

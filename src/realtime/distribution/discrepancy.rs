@@ -1,0 +1,1 @@
+//! How even a set of directions is.
