@@ -8,6 +8,7 @@ pub mod directions;
 pub mod distribution;
 pub mod engine;
 pub mod estimate;
+pub mod first_hits;
 pub mod flashlight;
 pub mod mesh;
 pub mod photon;

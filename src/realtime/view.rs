@@ -2,12 +2,13 @@
 
 use crate::math::rgb::{Rgb, mean};
 use crate::photons::path::{attenuation, medium_before};
+use crate::realtime::first_hits::FirstHits;
 use crate::realtime::mesh::Mesh;
 use crate::realtime::world::{World, WorldHit};
 use crate::scene::geometry::NONE;
 use crate::scene::{Camera, Material, Scene};
 use crate::trace::scatter::{reflected, refracted, specular_weights};
-use crate::trace::surface::SELF_INTERSECTION;
+use crate::trace::surface::{SELF_INTERSECTION, flat_normal, texture_coordinates};
 use crate::trace::{Differential, Ray};
 use glam::Vec3;
 use rayon::prelude::*;
@@ -41,10 +42,17 @@ struct Still {
     followed: bool,
 }
 
+impl Default for Still {
+    fn default() -> Self {
+        Self { sample: NOTHING, t: f32::INFINITY, followed: false }
+    }
+}
+
 /// The visibility buffer.
 #[derive(Default)]
 pub struct View {
     seen_by: Option<(Camera, [u32; 2], bool)>,
+    first_hits: FirstHits,
     still: Vec<Still>,
     samples: Vec<Sample>,
     offsets: Vec<Vec3>,
@@ -71,38 +79,69 @@ impl View {
         if self.seen_by == seen_by && !moved {
             return 0;
         }
+        let width = size[0].max(1) as usize;
         let all = self.seen_by != seen_by || world.is_rebuilt();
         if all {
-            self.still = each_pixel(camera, size, |ray, _| caster.still(ray));
+            self.look(&caster, camera, size);
+            self.samples.clear();
+            self.samples.extend(self.still.iter().map(|s| s.sample));
         }
         let now: Vec<[u32; 4]> = world.moving_bounds().filter_map(|b| screen_box(camera, size, b)).collect();
         let rects: Vec<[u32; 4]> = self.covered.iter().chain(&now).copied().collect();
-        let inside = |x: u32, y: u32, all: &[[u32; 4]]| {
-            all.iter().any(|r| (r[0]..r[2]).contains(&x) && (r[1]..r[3]).contains(&y))
-        };
-        let (still, old) = (&self.still, &self.samples);
-        let width = size[0] as usize;
-        let fresh: Vec<(Sample, bool)> = each_pixel(camera, size, |ray, [x, y]| {
-            let at = y as usize * width + x as usize;
-            let s = &still[at];
-            if s.followed && !now.is_empty() {
-                return (caster.sample(ray), true);
-            }
-            if inside(x, y, &now) {
-                return match world.closest_moving(scene, ray, s.t) {
-                    Some(found) => (caster.follow(*ray, found).0, true),
-                    None => (s.sample, true),
+        let still = &self.still;
+        let rays = camera.rays(size);
+        let again: u64 = self
+            .samples
+            .par_chunks_mut(width)
+            .enumerate()
+            .map(|(y, row)| {
+                let inside = |x: u32, all: &[[u32; 4]]| {
+                    all.iter().any(|r| (r[0]..r[2]).contains(&x) && (r[1]..r[3]).contains(&(y as u32)))
                 };
-            }
-            if all || inside(x, y, &rects) { (s.sample, false) } else { (old[at], false) }
-        });
-        let again = fresh.iter().filter(|f| f.1).count() as u64;
-        self.samples.clear();
-        self.samples.extend(fresh.into_iter().map(|f| f.0));
+                let mut cast = 0;
+                for (x, slot) in row.iter_mut().enumerate() {
+                    let s = &still[y * width + x];
+                    let (followed, covered) = (s.followed && !now.is_empty(), inside(x as u32, &now));
+                    if followed || covered {
+                        let (direction, _) = rays.ray(x as f32 + 0.5, y as f32 + 0.5, 0.5);
+                        let ray = Ray { origin: camera.position, direction };
+                        cast += 1;
+                        *slot = if followed {
+                            caster.sample(&ray)
+                        } else {
+                            world.closest_moving(scene, &ray, s.t).map_or(s.sample, |f| caster.follow(ray, f).0)
+                        };
+                    } else if inside(x as u32, &rects) {
+                        *slot = s.sample;
+                    }
+                }
+                cast
+            })
+            .sum();
         self.seen_by = seen_by;
-        self.offsets = world.offsets().to_vec();
+        self.offsets.clear();
+        self.offsets.extend_from_slice(world.offsets());
         self.covered = now;
         again + if all { self.still.len() as u64 } else { 0 }
+    }
+
+    /// Fills the buffer of what does not move.
+    fn look(&mut self, caster: &Caster, camera: &Camera, size: [u32; 2]) {
+        let (scene, world) = (caster.scene, caster.world);
+        // Without acceleration rays try every surface, view rays too.
+        if world.is_linear() {
+            self.still = each_pixel(camera, size, |ray, _| caster.still(ray));
+            return;
+        }
+        let geometry = world.moved_geometry().unwrap_or(&scene.geometry);
+        let front_only = caster.cull_back_faces;
+        let Self { first_hits, still, .. } = self;
+        first_hits.each_pixel(geometry, world.still_primitives(), camera, size, front_only, still, |ray, hit| {
+            let Some(hit) = hit else { return Still::default() };
+            let offset = world.offset_of(scene, hit.primitive);
+            let (sample, followed) = caster.follow(*ray, WorldHit { hit, offset });
+            Still { sample, t: hit.t, followed }
+        });
     }
 
     /// One sample for each pixel, row by row from the top.
@@ -169,7 +208,7 @@ impl Caster<'_> {
                 let (sample, followed) = self.follow(*ray, found);
                 Still { sample, t: found.hit.t, followed }
             }
-            None => Still { sample: NOTHING, t: f32::INFINITY, followed: false },
+            None => Still::default(),
         }
     }
 
@@ -181,8 +220,15 @@ impl Caster<'_> {
     ///
     /// A specular surface shows the stronger of its two branches; both belong to the progressive renderer.
     fn follow(&self, mut ray: Ray, mut found: WorldHit) -> (Sample, bool) {
+        let triangles = self.scene.geometry.triangles.len() as u32;
         let mut tint = Rgb::ONE;
         for step in 0..MOST_FOLLOWED {
+            if !self.cull_back_faces && found.hit.primitive < triangles {
+                let material = &self.scene.materials[self.scene.geometry.material(found.hit.primitive as usize)];
+                if material.is_diffuse() {
+                    return (self.on_triangle(&ray, &found, material, tint), step > 0);
+                }
+            }
             let surface = self.world.surface(self.scene, &ray, &found);
             let material = &self.scene.materials[surface.material as usize];
             if self.cull_back_faces && !surface.front {
@@ -212,6 +258,24 @@ impl Caster<'_> {
             }
         }
         (NOTHING, true)
+    }
+
+    /// As [`Caster::diffuse`] on a triangle, of which it needs less than the surface at the hit.
+    #[inline]
+    fn on_triangle(&self, ray: &Ray, found: &WorldHit, material: &Material, tint: Rgb) -> Sample {
+        let (g, index) = (&self.scene.geometry, found.hit.primitive as usize);
+        let place = self.mesh.on_triangle(found.hit.primitive, found.hit.weights);
+        let normal = flat_normal(g.corners(index));
+        let reflectance = match material {
+            Material::Diffuse { reflectance, texture: None } => *reflectance,
+            other => other.diffuse_reflectance(texture_coordinates(g, index, found.hit.weights)),
+        };
+        Sample {
+            triangle: place.triangle,
+            weights: place.weights,
+            back: normal.dot(ray.direction.as_dvec3()) >= 0.0,
+            tint: tint * reflectance,
+        }
     }
 
     fn diffuse(&self, found: &WorldHit, surface: &crate::trace::Surface, material: &Material, tint: Rgb) -> Sample {

@@ -121,8 +121,12 @@ impl World {
     /// The nearest surface of those that do not move; of all, if the hierarchy is built anew.
     pub fn closest_still(&self, scene: &Scene, ray: &Ray) -> Option<WorldHit> {
         let hit = self.still.closest(scene, ray, self.linear, self.rebuilt.as_ref())?;
-        let offset = if self.rebuilt.is_some() { self.offset(motion_of(scene, hit.primitive)) } else { Vec3::ZERO };
-        Some(WorldHit { hit, offset })
+        Some(WorldHit { hit, offset: self.offset_of(scene, hit.primitive) })
+    }
+
+    /// By how far a surface of [`World::closest_still`] has moved, metres.
+    pub fn offset_of(&self, scene: &Scene, primitive: u32) -> Vec3 {
+        if self.rebuilt.is_some() { self.offset(motion_of(scene, primitive)) } else { Vec3::ZERO }
     }
 
     /// The nearest surface of those that move, if one is met before the distance `limit`, metres.
@@ -141,6 +145,21 @@ impl World {
             }
         }
         best
+    }
+
+    /// Indices of the surfaces that do not move; of all, if the hierarchy is built anew.
+    pub fn still_primitives(&self) -> &[u32] {
+        &self.still.primitives
+    }
+
+    /// Surfaces where they are, if the hierarchy is built anew.
+    pub fn moved_geometry(&self) -> Option<&Geometry> {
+        self.rebuilt.as_ref()
+    }
+
+    /// Whether rays try every surface.
+    pub fn is_linear(&self) -> bool {
+        self.linear
     }
 
     /// Corners of the boxes around the parts that move, where they are now, metres.

@@ -50,13 +50,7 @@ impl Surface {
                 }
                 None => normal,
             };
-            let uv = match g.corner_uvs[index] {
-                [i, j, k] if i != NONE => {
-                    let at = |i: u32| g.uvs[i as usize];
-                    at(i) * (1.0 - wb - wc) + at(j) * wb + at(k) * wc
-                }
-                _ => Vec2::ZERO,
-            };
+            let uv = texture_coordinates(g, index, hit.weights);
             (a + (b - a) * wb + (c - a) * wc, normal, shading, uv)
         } else {
             let s = g.spheres[index - g.triangles.len()];
@@ -127,6 +121,17 @@ impl Surface {
     pub fn beside(&self, scene: &Scene, before: bool) -> Vec3 {
         let offset = scene.radius * SELF_INTERSECTION;
         if before { self.position + self.normal * offset } else { self.position - self.normal * offset }
+    }
+}
+
+/// Texture coordinates at a place of a triangle; zero where it has none.
+pub fn texture_coordinates(g: &Geometry, triangle: usize, [wb, wc]: [f32; 2]) -> Vec2 {
+    match g.corner_uvs[triangle] {
+        [i, j, k] if i != NONE => {
+            let at = |i: u32| g.uvs[i as usize];
+            at(i) * (1.0 - wb - wc) + at(j) * wb + at(k) * wc
+        }
+        _ => Vec2::ZERO,
     }
 }
 
