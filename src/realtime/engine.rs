@@ -1,7 +1,7 @@
 //! The frame loop: update, emit, balance, cull, estimate, draw (section 4.3).
 
 use crate::math::rgb::Rgb;
-use crate::realtime::estimate::{Estimator, Scratch};
+use crate::realtime::estimate::{Estimator, Place, Scratch};
 use crate::realtime::flashlight;
 use crate::realtime::mesh::Mesh;
 use crate::realtime::photon::Photon;
@@ -165,6 +165,15 @@ impl Engine {
         self.clear_irradiance();
     }
 
+    /// Goes on with the scene's lights at other places, or others of the same number and flux: photons of the frames
+    /// before stay until their frames leave the map.
+    pub fn move_lights(&mut self, lights: &[Light]) {
+        let mut scene = (*self.scene).clone();
+        scene.lights = lights.to_vec();
+        self.scene = Arc::new(scene);
+        self.world.set_lights(&self.scene);
+    }
+
     fn with_mesh(scene: &Arc<Scene>, settings: RealtimeSettings, mesh: Arc<Mesh>) -> Self {
         let none = RealtimeSettings { mesh_refinement: 0, ..settings.clone() };
         let mut engine = Self::new(scene, none);
@@ -294,8 +303,8 @@ impl Engine {
                 } else {
                     self.mesh.triangles[slot as usize / 6][slot as usize % 6 / 2]
                 };
-                let (position, normal) = place(&self.mesh, &self.world, vertex, slot % 2 == 1);
-                estimator.irradiance(position, normal, u64::from(slot), scratch)
+                let at = place(&self.mesh, &self.world, vertex, slot % 2 == 1);
+                estimator.irradiance(&at, u64::from(slot), scratch)
             })
             .collect();
         let (mut change, mut sum) = (0.0f64, 0.0f64);
@@ -338,8 +347,8 @@ impl Engine {
             .par_iter()
             .with_min_len(16)
             .map_init(Scratch::default, |scratch, &(vertex, back)| {
-                let (position, normal) = place(&self.mesh, &self.world, vertex, back);
-                estimator.irradiance(position, normal, 2 * u64::from(vertex) + u64::from(back), scratch)
+                let at = place(&self.mesh, &self.world, vertex, back);
+                estimator.irradiance(&at, 2 * u64::from(vertex) + u64::from(back), scratch)
             })
             .collect()
     }
@@ -390,11 +399,11 @@ pub fn mesh(scene: &Scene, s: &RealtimeSettings) -> Mesh {
     Mesh::new(&scene.geometry, s.mesh_refinement, s.max_edge, |p| world::motion_of(scene, p))
 }
 
-/// Where a vertex is, and the normal of its front or back.
-fn place(mesh: &Mesh, world: &World, vertex: u32, back: bool) -> (Vec3, Vec3) {
+/// Where a vertex is, with the normal of its front or back.
+fn place(mesh: &Mesh, world: &World, vertex: u32, back: bool) -> Place {
     let v = &mesh.vertices[vertex as usize];
     let offset = if v.motion == NONE { Vec3::ZERO } else { world.offset(v.motion) };
-    (v.position + offset, if back { -v.normal } else { v.normal })
+    Place { position: v.position + offset, normal: if back { -v.normal } else { v.normal }, inward: v.inward }
 }
 
 fn lights(scene: &Scene, world: &World, s: &RealtimeSettings, camera: &Camera) -> Vec<Light> {

@@ -38,6 +38,20 @@ pub struct Estimate {
     pub area: f64,
 }
 
+/// A place whose irradiance is asked for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Place {
+    /// Where, metres.
+    pub position: Vec3,
+    /// Unit normal on the side that is asked for.
+    pub normal: Vec3,
+    /// Along the surface away from its edge, metres; zero far from one.
+    pub inward: Vec3,
+}
+
+/// Part of the way inwards by which gather rays start off the edge of a surface.
+const INWARD: f32 = 0.02;
+
 /// Estimates irradiance from the photon map of a frame.
 pub struct Estimator<'a> {
     scene: &'a Scene,
@@ -81,9 +95,13 @@ impl<'a> Estimator<'a> {
     /// reflectance over π times the irradiance where they arrive. Light straight from lights is not in it.
     ///
     /// The paper multiplies by the BRDF; the reflectance it must be, as the rays are cosine-weighted.
-    pub fn final_gathering(&self, position: Vec3, normal: Vec3, seed: u64, scratch: &mut Scratch) -> Rgb {
+    ///
+    /// The rays start a little `inward`: from the edge of two walls half of them would leave through the other one, which
+    /// is what the paper's corners suffer from (section 6.2.1).
+    pub fn final_gathering(&self, at: &Place, seed: u64, scratch: &mut Scratch) -> Rgb {
         let numbers = Sequence::new(Sampling::Sobol, mix(self.settings.seed, seed));
-        let origin = position + normal * (self.scene.radius * SELF_INTERSECTION);
+        let normal = at.normal;
+        let origin = at.position + at.inward * INWARD + normal * (self.scene.radius * SELF_INTERSECTION);
         let mut sum = DVec3::ZERO;
         for i in 0..self.settings.final_gathering_rays {
             let x = numbers.four(u64::from(i), 0);
@@ -100,11 +118,11 @@ impl<'a> Estimator<'a> {
     }
 
     /// Irradiance as the settings ask for it.
-    pub fn irradiance(&self, position: Vec3, normal: Vec3, seed: u64, scratch: &mut Scratch) -> Rgb {
+    pub fn irradiance(&self, at: &Place, seed: u64, scratch: &mut Scratch) -> Rgb {
         if self.settings.final_gathering {
-            self.final_gathering(position, normal, seed, scratch)
+            self.final_gathering(at, seed, scratch)
         } else {
-            self.direct_gathering(position, normal, scratch).irradiance
+            self.direct_gathering(at.position, at.normal, scratch).irradiance
         }
     }
 }

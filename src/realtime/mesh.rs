@@ -22,6 +22,8 @@ pub struct Vertex {
     pub normal: Vec3,
     /// Which motion moves it; [`NONE`] for none.
     pub motion: u32,
+    /// From it to the mean of the centres of its triangles, metres: into its surface, where it lies on an edge.
+    pub inward: Vec3,
 }
 
 /// A base triangle as it is split: leaves are triangles of the mesh.
@@ -114,7 +116,23 @@ impl Mesh {
             r.split(edge.ends);
         }
         r.mesh.longest = r.waiting.peek().map_or(0.0, |e| e.squared.sqrt());
+        r.mesh.point_inward();
         r.mesh
+    }
+
+    fn point_inward(&mut self) {
+        let mut sums = vec![(Vec3::ZERO, 0u32); self.vertices.len()];
+        for t in &self.triangles {
+            let center = t.iter().map(|&v| self.vertices[v as usize].position / 3.0).sum::<Vec3>();
+            for &v in t {
+                let (sum, count) = &mut sums[v as usize];
+                *sum += center - self.vertices[v as usize].position;
+                *count += 1;
+            }
+        }
+        for (v, (sum, count)) in self.vertices.iter_mut().zip(sums) {
+            v.inward = sum / count.max(1) as f32;
+        }
     }
 
     /// Length of the longest edge, metres; 0 without any.
@@ -217,7 +235,7 @@ impl Refinement {
         }
         let (mesh, places, flats) = (&mut self.mesh, &mut self.places, &mut self.flat);
         *self.vertex_of.entry((place, bits(normal), motion)).or_insert_with(|| {
-            mesh.vertices.push(Vertex { position, normal, motion });
+            mesh.vertices.push(Vertex { position, normal, motion, inward: Vec3::ZERO });
             places.push(place);
             flats.push(flat);
             mesh.vertices.len() as u32 - 1

@@ -16,6 +16,8 @@ pub mod photon_map;
 pub mod picture;
 pub mod search;
 pub mod settings;
+#[cfg(test)]
+mod tests;
 pub mod tracer;
 pub mod view;
 pub mod world;

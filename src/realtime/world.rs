@@ -81,19 +81,25 @@ impl World {
             return false;
         }
         self.offsets = offsets;
-        for (m, offset) in scene.motions.iter().zip(&self.offsets) {
-            for &l in &m.lights {
-                // The loader has counted them.
-                if let (Some(to), Some(from)) = (self.lights.get_mut(l as usize), scene.lights.get(l as usize)) {
-                    *to = from.moved(*offset);
-                }
-            }
-        }
+        self.set_lights(scene);
         if let Some(g) = &mut self.rebuilt {
             moved_geometry(scene, &self.offsets, g);
             self.still.intersector = Intersector::new(g, scene.radius);
         }
         true
+    }
+
+    /// Takes the lights of the scene, and moves those that move to where they are.
+    pub fn set_lights(&mut self, scene: &Scene) {
+        self.lights.clone_from(&scene.lights);
+        for (m, offset) in scene.motions.iter().zip(&self.offsets) {
+            for &l in &m.lights {
+                // The loader has counted them.
+                if let Some(light) = self.lights.get_mut(l as usize) {
+                    *light = light.moved(*offset);
+                }
+            }
+        }
     }
 
     /// The lights, where they are.

@@ -17,9 +17,10 @@ pub enum Distribution {
     Rejection,
     /// Random height and azimuth.
     Explicit,
-    /// The spiral of Saff and Kuijlaars 1997 (figure 3.6), which leaves a band about φ = 0 bare.
+    /// The spiral of Saff and Kuijlaars 1997 (section 3.4.1). Figure 3.7 shows it with a bare band about φ = 0; the formula
+    /// has none, as a test counts.
     SaffKuijlaars,
-    /// A spiral that turns by the golden angle, without a bare band.
+    /// A spiral that turns by the golden angle: no recurrence, no points on the poles.
     Spiral,
     /// One random point in each of as many cells of equal area (eq. 3.11).
     Stratified,
