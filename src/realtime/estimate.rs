@@ -25,6 +25,13 @@ pub struct Scratch {
     in_plane: Vec<DVec2>,
 }
 
+impl Scratch {
+    /// The photons of the last direct gathering, by index in the map, each with the bits of its squared distance.
+    pub fn found(&self) -> &Nearest {
+        &self.found
+    }
+}
+
 /// An irradiance estimate and what it was made of.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Estimate {
@@ -75,6 +82,11 @@ impl<'a> Estimator<'a> {
             map,
             settings,
         }
+    }
+
+    /// One over the number of frames in the map, by which powers are multiplied.
+    pub fn scale(&self) -> f64 {
+        self.scale
     }
 
     /// Radius of its searches, metres.
