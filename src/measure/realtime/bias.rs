@@ -429,7 +429,7 @@ mod tests {
             set(&mut table, text).expect(text);
         }
         let settings = RealtimeSettings::new(&scene, &table, 1).expect("valid");
-        let probes = probes(&scene, &reference, 0.15, 7);
+        let probes = probes(&scene, &reference, 0.25, 7);
         for region in Region::ALL {
             assert!(probes.iter().filter(|p| p.region == region).count() > 4, "{region:?}");
         }
