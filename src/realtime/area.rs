@@ -250,23 +250,14 @@ mod tests {
     /// hull itself lacks a fifth and more.
     #[test]
     fn the_enlarged_hull_has_the_area_of_the_region() {
-        let regions: [(fn([f64; 2]) -> DVec2, f64); 3] = [
-            (
-                |[u, v]| {
-                    let (x, y) = concentric_disc(u as f32, v as f32);
-                    DVec2::new(f64::from(x), f64::from(y))
-                },
-                PI,
-            ),
-            (
-                |[u, v]| {
-                    let (x, y) = concentric_disc(u as f32, v as f32);
-                    DVec2::new(f64::from(x), f64::from(y).abs())
-                },
-                PI / 2.0,
-            ),
-            (|[u, v]| DVec2::new(u, 0.05 * v), 0.05),
-        ];
+        type Region = fn([f64; 2]) -> DVec2;
+        fn disc([u, v]: [f64; 2]) -> DVec2 {
+            let (x, y) = concentric_disc(u as f32, v as f32);
+            DVec2::new(f64::from(x), f64::from(y))
+        }
+        let half: Region = |x| DVec2::new(disc(x).x, disc(x).y.abs());
+        let strip: Region = |[u, v]| DVec2::new(u, 0.05 * v);
+        let regions = [(disc as Region, PI), (half, PI / 2.0), (strip, 0.05)];
         for (region, area) in regions {
             let sets = 400;
             let (mut plain, mut enlarged) = (0.0, 0.0);

@@ -110,26 +110,7 @@ impl Engine {
     /// An engine before its first frame.
     pub fn new(scene: &Arc<Scene>, settings: RealtimeSettings) -> Self {
         let mesh = Arc::new(mesh(scene, &settings));
-        let world = World::new(scene, settings.moving, settings.acceleration);
-        let lights = lights(scene, &world, &settings, &scene.camera);
-        let mut engine = Self {
-            tracer: Tracer::new(&settings, &lights),
-            map: PhotonMap::new(settings.accumulation_frames),
-            scene: Arc::clone(scene),
-            world,
-            mesh,
-            view: View::default(),
-            lights,
-            next: 0,
-            spare: Vec::new(),
-            irradiance: Vec::new(),
-            map_version: 0,
-            report: FrameReport::default(),
-            wanted: Vec::new(),
-            settings,
-        };
-        engine.clear_irradiance();
-        engine
+        Self::with_mesh(scene, settings, mesh)
     }
 
     /// Goes on with another scene or other settings; keeps the mesh while it serves, and photons while what made them is
@@ -175,10 +156,24 @@ impl Engine {
     }
 
     fn with_mesh(scene: &Arc<Scene>, settings: RealtimeSettings, mesh: Arc<Mesh>) -> Self {
-        let none = RealtimeSettings { mesh_refinement: 0, ..settings.clone() };
-        let mut engine = Self::new(scene, none);
-        engine.settings = settings;
-        engine.mesh = mesh;
+        let world = World::new(scene, settings.moving, settings.acceleration);
+        let lights = lights(scene, &world, &settings, &scene.camera);
+        let mut engine = Self {
+            tracer: Tracer::new(&settings, &lights),
+            map: PhotonMap::new(settings.accumulation_frames),
+            scene: Arc::clone(scene),
+            world,
+            mesh,
+            view: View::default(),
+            lights,
+            next: 0,
+            spare: Vec::new(),
+            irradiance: Vec::new(),
+            map_version: 0,
+            report: FrameReport::default(),
+            wanted: Vec::new(),
+            settings,
+        };
         engine.clear_irradiance();
         engine
     }

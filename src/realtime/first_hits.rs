@@ -26,6 +26,21 @@ struct Candidate {
     depths: DVec3,
 }
 
+/// What is looked at, and from where.
+#[derive(Clone, Copy)]
+pub struct Seen<'a> {
+    /// Surfaces, where they are.
+    pub geometry: &'a Geometry,
+    /// Indices of those that count.
+    pub primitives: &'a [u32],
+    /// The eye.
+    pub camera: &'a Camera,
+    /// Pixels across and down.
+    pub size: [u32; 2],
+    /// Whether the backs of triangles are looked through.
+    pub front_only: bool,
+}
+
 /// First hits of the view rays of a camera through an image.
 #[derive(Default)]
 pub struct FirstHits {
@@ -47,20 +62,13 @@ struct Pinhole {
 
 impl FirstHits {
     /// What each pixel's ray through its centre meets first, row by row: `make` gets the ray and the hit.
-    ///
-    /// `primitives` of `geometry` are looked at, without the backs of triangles if `front_only`.
-    pub fn each_pixel<T: Send + Clone>(
+    pub fn each_pixel<T: Send + Clone + Default>(
         &mut self,
-        geometry: &Geometry,
-        primitives: &[u32],
-        camera: &Camera,
-        size: [u32; 2],
-        front_only: bool,
+        seen: &Seen,
         out: &mut Vec<T>,
         make: impl Fn(&Ray, Option<Hit>) -> T + Sync,
-    ) where
-        T: Default,
-    {
+    ) {
+        let &Seen { geometry, primitives, camera, size, front_only } = seen;
         let pinhole = Pinhole {
             eye: camera.position.as_dvec3(),
             right: camera.frame[0].as_dvec3(),
@@ -232,9 +240,9 @@ impl Bounds {
     }
 
     fn add(&mut self, p: [f64; 2]) {
-        for axis in 0..2 {
-            self.low[axis] = self.low[axis].min(p[axis]);
-            self.high[axis] = self.high[axis].max(p[axis]);
+        for (axis, x) in p.into_iter().enumerate() {
+            self.low[axis] = self.low[axis].min(x);
+            self.high[axis] = self.high[axis].max(x);
         }
     }
 
@@ -280,8 +288,9 @@ mod tests {
             }
             for camera in cameras {
                 let mut found = Vec::new();
-                let there = world.moved_geometry().unwrap_or(&scene.geometry);
-                FirstHits::default().each_pixel(there, &all, &camera, size, false, &mut found, |r, h| Some((*r, h)));
+                let geometry = world.moved_geometry().unwrap_or(&scene.geometry);
+                let seen = Seen { geometry, primitives: &all, camera: &camera, size, front_only: false };
+                FirstHits::default().each_pixel(&seen, &mut found, |r, h| Some((*r, h)));
                 let mut other = 0;
                 for (ray, hit) in found.into_iter().flatten() {
                     let single = world.closest(&scene, &ray).map(|w| w.hit);
@@ -308,15 +317,9 @@ mod tests {
             Camera { position: Vec3::new(0.0, 12.0, 0.1), frame: [Vec3::X, Vec3::NEG_Z, Vec3::NEG_Y], ..scene.camera };
         for front_only in [false, true] {
             let mut heights: Vec<Option<f32>> = Vec::new();
-            FirstHits::default().each_pixel(
-                &scene.geometry,
-                &all,
-                &camera,
-                [20, 20],
-                front_only,
-                &mut heights,
-                |r, h| h.map(|h| (r.origin + r.direction * h.t).y),
-            );
+            let seen =
+                Seen { geometry: &scene.geometry, primitives: &all, camera: &camera, size: [20, 20], front_only };
+            FirstHits::default().each_pixel(&seen, &mut heights, |r, h| h.map(|h| (r.origin + r.direction * h.t).y));
             // The ceiling from above is a back; without it the floor is seen.
             let middle = heights[10 * 20 + 10].expect("a surface");
             assert!((middle > 1.0) != front_only, "{middle}");

@@ -2,7 +2,7 @@
 
 use crate::math::rgb::{Rgb, mean};
 use crate::photons::path::{attenuation, medium_before};
-use crate::realtime::first_hits::FirstHits;
+use crate::realtime::first_hits::{FirstHits, Seen};
 use crate::realtime::mesh::Mesh;
 use crate::realtime::world::{World, WorldHit};
 use crate::scene::geometry::NONE;
@@ -134,9 +134,10 @@ impl View {
             return;
         }
         let geometry = world.moved_geometry().unwrap_or(&scene.geometry);
-        let front_only = caster.cull_back_faces;
+        let seen =
+            Seen { geometry, primitives: world.still_primitives(), camera, size, front_only: caster.cull_back_faces };
         let Self { first_hits, still, .. } = self;
-        first_hits.each_pixel(geometry, world.still_primitives(), camera, size, front_only, still, |ray, hit| {
+        first_hits.each_pixel(&seen, still, |ray, hit| {
             let Some(hit) = hit else { return Still::default() };
             let offset = world.offset_of(scene, hit.primitive);
             let (sample, followed) = caster.follow(*ray, WorldHit { hit, offset });
