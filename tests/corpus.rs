@@ -29,6 +29,11 @@ fn meshes() {
 }
 
 #[test]
+fn maps() {
+    replay("map", targets::map);
+}
+
+#[test]
 fn sessions() {
     replay("session", targets::session);
 }

@@ -5,7 +5,7 @@ use crate::realtime::estimate::{Estimator, Place, Scratch};
 use crate::realtime::flashlight;
 use crate::realtime::mesh::Mesh;
 use crate::realtime::photon::Photon;
-use crate::realtime::photon_map::PhotonMap;
+use crate::realtime::photon_map::{CellOf, PhotonMap};
 use crate::realtime::picture;
 use crate::realtime::settings::RealtimeSettings;
 use crate::realtime::tracer::{TraceCounts, Tracer};
@@ -141,7 +141,7 @@ impl Engine {
         if !looks_alike {
             self.view.forget();
         }
-        self.map.balance(&self.settings, None);
+        self.balance();
         self.map_version += 1;
         self.clear_irradiance();
     }
@@ -200,7 +200,7 @@ impl Engine {
         let counts = self.tracer.trace(&self.scene, &self.world, &self.lights, &self.settings, self.next, &mut store);
         self.spare = self.map.store(self.next, store);
         let emitted = Instant::now();
-        self.map.balance(&self.settings, None);
+        self.balance();
         self.map_version += 1;
         let balanced = Instant::now();
         self.report = FrameReport {
@@ -215,6 +215,13 @@ impl Engine {
             ..self.counted(counts)
         };
         self.next += 1;
+    }
+
+    fn balance(&mut self) {
+        let cells = self.scene.cells.as_deref();
+        // Outside of the map is a cell too.
+        let of = |p: Vec3| cells.and_then(|c| c.cluster(p)).unwrap_or(u32::MAX);
+        self.map.balance(&self.settings, cells.map(|_| &of as CellOf));
     }
 
     fn counted(&self, c: TraceCounts) -> FrameReport {

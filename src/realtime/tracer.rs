@@ -10,7 +10,7 @@ use crate::realtime::directions::{self, Directions};
 use crate::realtime::photon::Photon;
 use crate::realtime::settings::{RealtimeSettings, Scattering};
 use crate::realtime::world::World;
-use crate::scene::{Light, Material, Scene};
+use crate::scene::{Light, Scene};
 use crate::trace::scatter::{reflected, refracted, specular_weights};
 use crate::trace::surface::SELF_INTERSECTION;
 use crate::trace::{Differential, Ray, Surface};
@@ -220,7 +220,7 @@ impl Path<'_> {
             return;
         }
         // Photons take the mean colour of a texture with them.
-        let mut reflectance = bleeding(&self.scene.materials[surface.material as usize], &surface);
+        let mut reflectance = self.scene.materials[surface.material as usize].average_reflectance();
         match self.s.scattering {
             Scattering::Splitting => reflectance /= self.s.diffuse_reflections as f32,
             Scattering::Roulette => {
@@ -261,11 +261,6 @@ impl Path<'_> {
             self.out.push(Photon { position, power: power / size as f32, ..photon });
         }
     }
-}
-
-/// Reflectance by which a photon is reflected: the mean of a texture, not what it has where the photon arrives.
-fn bleeding(material: &Material, surface: &Surface) -> Rgb {
-    material.diffuse_reflectance(surface.uv)
 }
 
 /// Start of a path that leaves a surface: a step back along the ray that came, which stays in front of every other

@@ -74,6 +74,18 @@ impl Material {
     }
 }
 
+impl Material {
+    /// Diffuse reflectance with the mean of its texture; black for other kinds.
+    pub fn average_reflectance(&self) -> Rgb {
+        match self {
+            Self::Diffuse { reflectance, texture } => {
+                texture.as_ref().map_or(*reflectance, |t| *reflectance * t.average())
+            }
+            _ => Rgb::ZERO,
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

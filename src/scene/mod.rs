@@ -13,6 +13,7 @@ pub mod material;
 pub mod memory;
 pub mod motion;
 pub mod obj;
+pub mod quake;
 pub mod scene_file;
 pub mod shapes;
 pub mod source;
@@ -26,7 +27,8 @@ pub use material::Material;
 pub use motion::Motion;
 pub use source::{Source, open};
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
+use quake::Cells;
 use scene_file::{RealtimeFile, RenderFile};
 use std::sync::Arc;
 
@@ -61,8 +63,23 @@ pub struct Scene {
     pub realtime_lines: (std::path::PathBuf, std::collections::BTreeMap<String, usize>),
     /// What moves in real-time rendering; everything else renders it where the file has it.
     pub motions: Vec<Motion>,
+    /// Places to look from that the scene names.
+    pub viewpoints: Vec<Viewpoint>,
+    /// Cells of visibility, if the scene has them.
+    pub cells: Option<Arc<Cells>>,
     /// What was defined but odd, one line each.
     pub warnings: Vec<String>,
+}
+
+/// A place to look from.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Viewpoint {
+    /// What the scene calls it.
+    pub name: String,
+    /// Eye, metres about the local origin.
+    pub position: Vec3,
+    /// Point looked at.
+    pub target: Vec3,
 }
 
 impl Scene {

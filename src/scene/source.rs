@@ -1,9 +1,10 @@
-//! Where a scene comes from: a built-in name, a TOML file or an OBJ file.
+//! Where a scene comes from: a built-in name, a TOML file, an OBJ file or a Quake 3 map.
 
 use crate::math::hash::{FNV_START, fnv1a};
 use crate::scene::built_in::{self, BuiltIn};
 use crate::scene::load;
 use crate::scene::memory;
+use crate::scene::quake;
 use crate::scene::scene_file::SceneFile;
 use crate::scene::{Scene, SceneError};
 use std::collections::BTreeMap;
@@ -122,10 +123,15 @@ impl Source {
                 let (path, text, scene) = (path.to_owned(), String::new(), Arc::new(scene));
                 Ok(Self { name: name.to_owned(), file, scene, path, text, files: folder() })
             }
-            "bsp" | "pk3" => Err(SceneError::Whole {
-                file: path.to_owned(),
-                what: "Quake 3 maps cannot be read yet; convert it to OBJ".into(),
-            }),
+            _ if quake::is_map(name) => {
+                // `archive.pk3:maps/name.bsp` is in the archive's folder.
+                let (file, map) = quake::split_name(name);
+                let path = Path::new(file);
+                let files = Files::Folder(path.parent().unwrap_or(Path::new("")).to_owned());
+                let (file, scene) = load::scene_from_map(path, map, &files)?;
+                let (path, text, scene) = (path.to_owned(), String::new(), Arc::new(scene));
+                Ok(Self { name: name.to_owned(), file, scene, path, text, files })
+            }
             _ => Err(SceneError::Unknown { name: name.to_owned(), known: built_in::names() }),
         }
     }

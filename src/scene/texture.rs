@@ -12,6 +12,7 @@ use std::io::Cursor;
 pub struct Texture {
     size: [u32; 2],
     texels: Vec<Rgb>,
+    average: Rgb,
 }
 
 impl Texture {
@@ -20,8 +21,16 @@ impl Texture {
     /// # Errors
     /// The reason, if the bytes are no PNG or the picture is too large.
     pub fn decode(png: &[u8]) -> Result<Self, String> {
+        Self::decode_as(png, ImageFormat::Png)
+    }
+
+    /// As [`Texture::decode`], of an image of that format: PNG, JPEG or TGA.
+    ///
+    /// # Errors
+    /// The reason, if the bytes are no such image or the picture is too large.
+    pub fn decode_as(bytes: &[u8], format: ImageFormat) -> Result<Self, String> {
         let one_line = |e: image::ImageError| e.to_string().split_whitespace().collect::<Vec<_>>().join(" ");
-        let reader = || ImageReader::with_format(Cursor::new(png), ImageFormat::Png);
+        let reader = || ImageReader::with_format(Cursor::new(bytes), format);
         let (width, height) = reader().into_dimensions().map_err(one_line)?;
         let pixels = u64::from(width) * u64::from(height);
         // Up to 16 bits in four channels as they are decoded, beside eight bits in three and the texels.
@@ -32,10 +41,19 @@ impl Texture {
         reader.no_limits();
         let image = reader.decode().map_err(one_line)?.to_rgb8();
         let table: Vec<f32> = (0..256).map(|i| srgb_to_linear(i as f32 / 255.0)).collect();
-        Ok(Self {
-            size: [image.width(), image.height()],
-            texels: image.pixels().map(|p| Rgb::from_array(p.0.map(|c| table[c as usize]))).collect(),
-        })
+        let texels = image.pixels().map(|p| Rgb::from_array(p.0.map(|c| table[c as usize]))).collect();
+        Ok(Self::new([image.width(), image.height()], texels))
+    }
+
+    fn new(size: [u32; 2], texels: Vec<Rgb>) -> Self {
+        let sum: glam::DVec3 = texels.iter().map(|t| t.as_dvec3()).sum();
+        let average = if texels.is_empty() { Rgb::ONE } else { (sum / texels.len() as f64).as_vec3() };
+        Self { size, texels, average }
+    }
+
+    /// Mean of all texels.
+    pub fn average(&self) -> Rgb {
+        self.average
     }
 
     /// Bilinear sample; `v` grows upwards, both coordinates repeat with period 1.
@@ -70,7 +88,8 @@ mod tests {
 
     #[test]
     fn samples_texel_centres_and_repeats() {
-        let t = Texture { size: [2, 2], texels: vec![Rgb::X, Rgb::Y, Rgb::Z, Rgb::ONE] };
+        let t = Texture::new([2, 2], vec![Rgb::X, Rgb::Y, Rgb::Z, Rgb::ONE]);
+        assert_eq!(t.average(), Rgb::splat(0.5));
         assert_eq!(t.sample(Vec2::new(0.25, 0.75)), Rgb::X);
         assert_eq!(t.sample(Vec2::new(0.75, 0.75)), Rgb::Y);
         assert_eq!(t.sample(Vec2::new(0.25, 0.25)), Rgb::Z);

@@ -9,7 +9,7 @@ use cusp::photons::PhotonKind;
 use cusp::render::inspect::inspect;
 use cusp::render::settings::PlanMode;
 use cusp::render::{RenderSettings, Renderer, Silent};
-use cusp::scene::load::{scene_from_obj, scene_from_toml};
+use cusp::scene::load::{scene_from_map, scene_from_obj, scene_from_toml};
 use cusp::scene::scene_file::RenderFile;
 use cusp::scene::source::Files;
 use cusp::scene::{Light, Scene};
@@ -42,6 +42,23 @@ pub fn obj(data: &[u8]) -> Result<(), String> {
     files.insert("mesh.obj".into(), text.clone().into_bytes());
     let loaded = scene_from_obj(Path::new("mesh.obj"), &text, &Files::Memory(files));
     let (_, scene) = loaded.map_err(|e| refused(&e.to_string()))?;
+    render(scene)
+}
+
+/// A Quake 3 map opened as a scene: the bytes as they are, and the same as an archive.
+pub fn map(data: &[u8]) -> Result<(), String> {
+    let name = if data.starts_with(b"PK") { "map.pk3" } else { "map.bsp" };
+    let files = Files::Memory(BTreeMap::from([(name.to_owned(), data.to_vec())]));
+    let loaded = scene_from_map(Path::new(name), None, &files);
+    let (_, scene) = loaded.map_err(|e| refused(&e.to_string()))?;
+    if let Some(cells) = &scene.cells {
+        for i in 0..8u32 {
+            let place = Vec3::new(i as f32 - 4.0, 0.5, 4.0 - i as f32);
+            let Some(cluster) = cells.cluster(place) else { continue };
+            assert!(cluster < cells.cluster_count());
+            cells.sees(cluster, 0);
+        }
+    }
     render(scene)
 }
 

@@ -37,6 +37,8 @@ pub fn scene(geometry: Geometry, material: Material, radius: f32) -> Scene {
         realtime: Default::default(),
         realtime_lines: Default::default(),
         motions: Vec::new(),
+        viewpoints: Vec::new(),
+        cells: None,
         warnings: Vec::new(),
     }
 }

@@ -2,6 +2,7 @@
 
 mod assembly;
 mod lights;
+mod maps;
 mod materials;
 mod surfaces;
 
@@ -11,13 +12,15 @@ use crate::scene::geometry::BYTES_PER_TRIANGLE as TRIANGLE_BYTES;
 use crate::scene::geometry::BYTES_PER_VERTEX as VERTEX_BYTES;
 use crate::scene::locate::Locator;
 use crate::scene::memory;
+use crate::scene::quake;
 use crate::scene::scene_file::{AnimateFile, CameraFile, LightFile, RealtimeFile, RenderFile, SceneFile, ShapeFile};
 use crate::scene::source::{Files, hash_of};
-use crate::scene::{Camera, Light, Scene, SceneError};
+use crate::scene::{Camera, Light, Scene, SceneError, Viewpoint};
 use assembly::{Assembly, CameraSource, Extent, LightSource, Moving, local_geometry};
 use glam::DVec3;
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::sync::Arc;
 
 /// Largest number of pixels of an image across or down.
 pub const MAX_RESOLUTION: i64 = 32_768;
@@ -81,6 +84,41 @@ pub fn scene_from_file(file: &Path, text: &str, parsed: &SceneFile, files: &File
     let camera = loader.camera(camera)?;
     let name = parsed.name.clone().unwrap_or_else(|| stem(file));
     loader.finish(name, &camera, parsed.render.clone(), parsed.realtime.clone())
+}
+
+/// A map of Quake 3 as a scene of its own: its lights, and a camera where a player starts. Returns the scene file that
+/// says so, and the scene. `files` holds it, an archive with the map of the name `map`, or its only one.
+///
+/// # Errors
+/// Anything wrong in the file.
+pub fn scene_from_map(file: &Path, map: Option<&str>, files: &Files) -> Checked<(SceneFile, Scene)> {
+    let mut name = file.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
+    if let Some(map) = map {
+        name = format!("{name}:{map}");
+    }
+    let shape = ShapeFile { kind: "mesh".into(), file: Some(name.clone()), ..Default::default() };
+    let mut loader = Loader::new(Locator::new(file, ""), files);
+    loader.shape("mesh", &shape)?;
+    let (center, radius) = loader.assembly.bounds();
+    let viewpoints = quake::viewpoints(&loader.entities);
+    let (lights, notes) = quake::lights(&loader.entities, &viewpoints, center);
+    loader.warnings.extend(notes);
+    for (i, light) in lights.iter().enumerate() {
+        loader.light(&format!("lights[{i}]"), light)?;
+    }
+    let camera = quake::camera(&viewpoints, center, radius);
+    let source = loader.camera(&camera)?;
+    let title = stem(map.map_or(file, Path::new));
+    let written = SceneFile {
+        name: Some(title.clone()),
+        camera: Some(camera),
+        materials: BTreeMap::new(),
+        shapes: vec![shape],
+        lights,
+        render: RenderFile::default(),
+        realtime: RealtimeFile::default(),
+    };
+    loader.finish(title, &source, RenderFile::default(), RealtimeFile::default()).map(|scene| (written, scene))
 }
 
 /// The camera of a scene file, about a local origin that is known.
@@ -151,6 +189,10 @@ struct Loader<'a> {
     triangles: u64,
     /// Their vertices and normals, the more numerous of the two.
     vertices: u64,
+    /// Entities of a map among the shapes.
+    entities: Vec<quake::Entity>,
+    /// Its cells, if it stands where its file has it.
+    cells: Option<quake::Cells>,
 }
 
 impl<'a> Loader<'a> {
@@ -165,6 +207,8 @@ impl<'a> Loader<'a> {
             memory: None,
             triangles: 0,
             vertices: 0,
+            entities: Vec::new(),
+            cells: None,
         }
     }
 
@@ -390,6 +434,11 @@ impl<'a> Loader<'a> {
             realtime,
             realtime_lines: self.locator.lines_of("realtime"),
             motions,
+            viewpoints: quake::viewpoints(&self.entities)
+                .into_iter()
+                .map(|v| Viewpoint { name: v.name, position: local(v.position), target: local(v.target) })
+                .collect(),
+            cells: self.cells.map(|c| Arc::new(c.about(origin))),
             warnings: self.warnings,
         })
     }

@@ -5,6 +5,7 @@ use super::{Checked, Loader, MAX_LENGTH};
 use crate::math::rgb::Rgb;
 use crate::scene::geometry::NONE;
 use crate::scene::obj::{self, CREASE_ANGLE};
+use crate::scene::quake;
 use crate::scene::scene_file::{LightFile, RotateFile, ShapeFile};
 use crate::scene::shapes::{self, Placement};
 use crate::scene::{Material, SceneError};
@@ -185,8 +186,11 @@ impl Loader<'_> {
 
     pub(super) fn mesh(&mut self, key: &str, s: &ShapeFile, place: &Placement, material: Option<u32>) -> Checked<()> {
         let Some(name) = &s.file else {
-            return self.wrong(format!("{key}.file"), "is missing; name an OBJ file");
+            return self.wrong(format!("{key}.file"), "is missing; name an OBJ file or a Quake 3 map");
         };
+        if quake::is_map(name) {
+            return self.map(key, name, place, material);
+        }
         let crease = s.crease_angle.unwrap_or(CREASE_ANGLE);
         if !(0.0..=180.0).contains(&crease) {
             return self.wrong(format!("{key}.crease_angle"), format!("must lie in [0, 180] degrees, got {crease}"));
@@ -252,7 +256,7 @@ impl Loader<'_> {
     }
 
     /// Whether a placed shape lies where coordinates can be worked with.
-    fn within(&self, key: &str, points: &[DVec3]) -> Checked<()> {
+    pub(super) fn within(&self, key: &str, points: &[DVec3]) -> Checked<()> {
         let reach = points.iter().fold(0.0, |m: f64, p| m.max(p.abs().max_element()));
         if reach <= MAX_LENGTH {
             return Ok(());
