@@ -18,6 +18,8 @@ const NODRAW: u32 = 0x80;
 const HINT_OR_SKIP: u32 = 0x100 | 0x200;
 const WATER_OR_SLIME: u32 = 0x20 | 0x10;
 const FOG: u32 = 0x40;
+/// Some lava is said to be water too; it stays, for nothing is seen through it.
+const LAVA: u32 = 0x8;
 
 /// Why a face is left out, if it is.
 fn left_out(t: &TextureRecord) -> Option<&'static str> {
@@ -30,7 +32,7 @@ fn left_out(t: &TextureRecord) -> Option<&'static str> {
         Some("not drawn")
     } else if t.contents & FOG != 0 {
         Some("fog")
-    } else if t.contents & WATER_OR_SLIME != 0 {
+    } else if t.contents & WATER_OR_SLIME != 0 && t.contents & LAVA == 0 {
         Some("water")
     } else {
         None
