@@ -11,6 +11,7 @@ mod methods;
 mod output;
 mod picture;
 mod printed;
+mod realtime;
 mod rows;
 mod spread;
 mod table_1;
@@ -123,6 +124,40 @@ enum ItemName {
     GatherFigure4,
     #[value(name = "gather-figure-5")]
     GatherFigure5,
+    #[value(name = "realtime-table-5.1")]
+    RealtimeTable51,
+    #[value(name = "realtime-table-6.1")]
+    RealtimeTable61,
+    #[value(name = "realtime-table-6.2")]
+    RealtimeTable62,
+    #[value(name = "realtime-figure-6.1")]
+    RealtimeFigure61,
+    #[value(name = "realtime-figure-6.2")]
+    RealtimeFigure62,
+    #[value(name = "realtime-figure-6.3")]
+    RealtimeFigure63,
+    #[value(name = "realtime-figure-6.4")]
+    RealtimeFigure64,
+    #[value(name = "realtime-figure-6.5")]
+    RealtimeFigure65,
+    #[value(name = "realtime-figure-6.6")]
+    RealtimeFigure66,
+    #[value(name = "realtime-figure-6.7")]
+    RealtimeFigure67,
+    #[value(name = "realtime-figure-6.8")]
+    RealtimeFigure68,
+    #[value(name = "realtime-figure-6.9")]
+    RealtimeFigure69,
+    #[value(name = "realtime-scattering")]
+    RealtimeScattering,
+    #[value(name = "realtime-bias")]
+    RealtimeBias,
+    #[value(name = "realtime-fluctuation")]
+    RealtimeFluctuation,
+    #[value(name = "realtime-timing")]
+    RealtimeTiming,
+    #[value(name = "realtime-parameters")]
+    RealtimeParameters,
     All,
 }
 
@@ -135,7 +170,7 @@ struct Item {
     run: fn(&'static str, &PaperFlags, &Path) -> Result<Done, Failure>,
 }
 
-const ITEMS: [Item; 12] = [
+const ITEMS: [Item; 29] = [
     Item {
         name: ItemName::Figure15,
         id: "figure-15",
@@ -219,6 +254,125 @@ const ITEMS: [Item; 12] = [
         source: "Gjøl et al., figure 5",
         summary: "the room by 800 gather rays, with errors",
         run: gathering::figures_4_5::run_5,
+    },
+    Item {
+        name: ItemName::RealtimeTable51,
+        id: "realtime-table-5.1",
+        source: "Kristensen and Ottosen 2003, table 5.1",
+        summary: "a search in one photon map or in several",
+        run: realtime::table_5_1::run,
+    },
+    Item {
+        name: ItemName::RealtimeTable61,
+        id: "realtime-table-6.1",
+        source: "Kristensen and Ottosen 2003, table 6.1",
+        summary: "frames per second over triangles and photons",
+        run: realtime::table_6_1::run,
+    },
+    Item {
+        name: ItemName::RealtimeTable62,
+        id: "realtime-table-6.2",
+        source: "Kristensen and Ottosen 2003, table 6.2",
+        summary: "frame rate and renewal time over accumulation frames",
+        run: realtime::table_6_2::run,
+    },
+    Item {
+        name: ItemName::RealtimeFigure61,
+        id: "realtime-figure-6.1",
+        source: "Kristensen and Ottosen 2003, figure 6.1",
+        summary: "the Cornell box with and without the sphere slice",
+        run: realtime::figures::run_1,
+    },
+    Item {
+        name: ItemName::RealtimeFigure62,
+        id: "realtime-figure-6.2",
+        source: "Kristensen and Ottosen 2003, figure 6.2",
+        summary: "directions of emission",
+        run: realtime::figures::run_2,
+    },
+    Item {
+        name: ItemName::RealtimeFigure63,
+        id: "realtime-figure-6.3",
+        source: "Kristensen and Ottosen 2003, figure 6.3",
+        summary: "the box by photon mapping in every pixel",
+        run: realtime::figures::run_3,
+    },
+    Item {
+        name: ItemName::RealtimeFigure64,
+        id: "realtime-figure-6.4",
+        source: "Kristensen and Ottosen 2003, figure 6.4",
+        summary: "final gathering from vertices",
+        run: realtime::figures::run_4,
+    },
+    Item {
+        name: ItemName::RealtimeFigure65,
+        id: "realtime-figure-6.5",
+        source: "Kristensen and Ottosen 2003, figure 6.5",
+        summary: "colour bleeding at two frame rates",
+        run: realtime::figures::run_5,
+    },
+    Item {
+        name: ItemName::RealtimeFigure66,
+        id: "realtime-figure-6.6",
+        source: "Kristensen and Ottosen 2003, figure 6.6",
+        summary: "soft shadows at two frame rates",
+        run: realtime::figures::run_6,
+    },
+    Item {
+        name: ItemName::RealtimeFigure67,
+        id: "realtime-figure-6.7",
+        source: "Kristensen and Ottosen 2003, figure 6.7",
+        summary: "indirect light in the level, coarse meshes",
+        run: realtime::figures::run_7,
+    },
+    Item {
+        name: ItemName::RealtimeFigure68,
+        id: "realtime-figure-6.8",
+        source: "Kristensen and Ottosen 2003, figure 6.8",
+        summary: "the same, fine meshes",
+        run: realtime::figures::run_8,
+    },
+    Item {
+        name: ItemName::RealtimeFigure69,
+        id: "realtime-figure-6.9",
+        source: "Kristensen and Ottosen 2003, figure 6.9",
+        summary: "the flashlight",
+        run: realtime::figures::run_9,
+    },
+    Item {
+        name: ItemName::RealtimeScattering,
+        id: "realtime-scattering",
+        source: "Kristensen and Ottosen 2003, section 3.4",
+        summary: "how even directions are; splitting against roulette",
+        run: realtime::scattering::run,
+    },
+    Item {
+        name: ItemName::RealtimeBias,
+        id: "realtime-bias",
+        source: "Kristensen and Ottosen 2003, section 3.5",
+        summary: "bias of each search and area, in parts",
+        run: realtime::bias::run,
+    },
+    Item {
+        name: ItemName::RealtimeFluctuation,
+        id: "realtime-fluctuation",
+        source: "Kristensen and Ottosen 2003, section 5.2.2",
+        summary: "fluctuation with and without coherent numbers",
+        run: realtime::fluctuation::run,
+    },
+    Item {
+        name: ItemName::RealtimeTiming,
+        id: "realtime-timing",
+        source: "Kristensen and Ottosen 2003, section 4.5.1",
+        summary: "parts of a frame by themselves and in context",
+        run: realtime::timing::run,
+    },
+    Item {
+        name: ItemName::RealtimeParameters,
+        id: "realtime-parameters",
+        source: "Kristensen and Ottosen 2003, section 6.1",
+        summary: "what each parameter costs",
+        run: realtime::parameters::run,
     },
 ];
 
