@@ -6,7 +6,7 @@ use crate::measure::flip::MAX_STOPS;
 use crate::render::StopRule;
 use crate::render::film::Rect;
 use crate::render::settings::PlanMode;
-use crate::scene::scene_file::{CameraFile, LightFile, MaterialFile, RenderFile, SceneFile};
+use crate::scene::scene_file::{CameraFile, LightFile, MaterialFile, RealtimeFile, RenderFile, SceneFile};
 use crate::scene::{SceneError, Source};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -74,6 +74,12 @@ pub struct Session {
     /// Settings on top of the scene's.
     #[serde(default)]
     pub render: RenderFile,
+    /// Which renderer the window shows.
+    #[serde(default, skip_serializing_if = "Rendering::is_progressive")]
+    pub rendering: Rendering,
+    /// Parameters of real-time rendering on top of the scene's.
+    #[serde(default, skip_serializing_if = "RealtimeFile::is_empty")]
+    pub realtime: RealtimeFile,
     /// The camera in place of the scene's.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub camera: Option<CameraFile>,
@@ -183,6 +189,24 @@ pub enum Curve {
     Reinhard,
 }
 
+/// Which renderer the window shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Rendering {
+    /// Passes that are averaged, under each panel's estimator.
+    #[default]
+    Progressive,
+    /// The frame loop of real-time photon mapping.
+    Realtime,
+}
+
+impl Rendering {
+    /// Whether it is the default.
+    pub fn is_progressive(&self) -> bool {
+        *self == Self::Progressive
+    }
+}
+
 /// The part of the images that is seen.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -258,6 +282,8 @@ impl Session {
             tone: Tone::default(),
             view: View::default(),
             render: RenderFile::default(),
+            rendering: Rendering::Progressive,
+            realtime: RealtimeFile::default(),
             camera: None,
             materials: BTreeMap::new(),
             lights: None,

@@ -63,6 +63,32 @@ pub fn moved(camera: &mut CameraFile, how: Move, x: f64, y: f64) -> bool {
     true
 }
 
+/// Walks with a camera: by metres to the right, up and forward, then turns it by radians to the right and up about the
+/// eye; whether it moved. Forward follows the view, up the camera's own up; it never looks straight up or down.
+pub fn walked(camera: &mut CameraFile, [right_by, up_by, forward_by]: [f64; 3], [yaw, pitch]: [f64; 2]) -> bool {
+    let (position, target) = (DVec3::from_array(camera.position), DVec3::from_array(camera.target));
+    let up = DVec3::from_array(camera.up.unwrap_or([0.0, 1.0, 0.0])).normalize_or(DVec3::Y);
+    let view = target - position;
+    let (distance, forward) = (view.length(), view.normalize_or_zero());
+    let right = forward.cross(up).normalize_or_zero();
+    if right == DVec3::ZERO || !distance.is_finite() {
+        return false;
+    }
+    let eye = position + right * right_by + up * up_by + forward * forward_by;
+    let elevation = libm::asin(forward.dot(up).clamp(-1.0, 1.0));
+    let limit = (std::f64::consts::FRAC_PI_2 - 0.01).max(elevation.abs());
+    let (se, ce) = libm::sincos((elevation + pitch).clamp(-limit, limit));
+    let flat = up.cross(right).normalize_or_zero();
+    let (sy, cy) = libm::sincos(yaw);
+    let turned = (flat * cy + right * sy) * ce + up * se;
+    let looked = eye + turned * distance;
+    if !(eye.is_finite() && looked.is_finite()) {
+        return false;
+    }
+    (camera.position, camera.target) = (eye.to_array(), looked.to_array());
+    true
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -94,6 +120,31 @@ mod tests {
         let height = 2.0 * 5.0 * libm::tan(20f64.to_radians());
         assert!((by.length() - height).abs() < 1e-9);
         assert!(by.y > 0.0 && (DVec3::from_array(c.position) - by - DVec3::new(0.0, 3.0, 4.0)).length() < 1e-9);
+    }
+
+    /// Forward goes along the view, right turns bring what was at the right into the middle, and the distance stays.
+    #[test]
+    fn walks_go_where_the_view_goes() {
+        let eye = |c: &CameraFile| DVec3::from_array(c.position);
+        let view = |c: &CameraFile| (DVec3::from_array(c.target) - eye(c)).normalize();
+        let (mut c, start) = (camera(), camera());
+        assert!(walked(&mut c, [0.0, 0.0, 2.0], [0.0; 2]));
+        assert!(
+            (eye(&c) - eye(&start) - view(&start) * 2.0).length() < 1e-9 && (view(&c) - view(&start)).length() < 1e-9
+        );
+        let right = view(&start).cross(DVec3::Y).normalize();
+        let mut c = camera();
+        walked(&mut c, [1.0, 0.5, 0.0], [0.0; 2]);
+        assert!((eye(&c) - eye(&start) - right - DVec3::Y * 0.5).length() < 1e-9);
+        let mut c = camera();
+        walked(&mut c, [0.0; 3], [0.3, 0.0]);
+        assert!(view(&c).dot(right) > 0.1 && (view(&c).y - view(&start).y).abs() < 1e-9 && eye(&c) == eye(&start));
+        walked(&mut c, [0.0; 3], [-0.3, 0.2]);
+        assert!(view(&c).y > view(&start).y + 0.1 && view(&c).dot(right).abs() < 1e-9);
+        walked(&mut c, [0.0; 3], [0.0, 99.0]);
+        assert!(view(&c).y < 1.0 && walked(&mut c, [0.0; 3], [1.0, 0.0]));
+        c.target = c.position;
+        assert!(!walked(&mut c, [0.0, 0.0, 1.0], [0.0; 2]));
     }
 
     #[test]

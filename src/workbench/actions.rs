@@ -55,6 +55,8 @@ pub enum Action {
     OneToOne,
     /// Zoom by a factor about the middle.
     Zoom(f32),
+    /// The real-time view, or the progressive one.
+    SwitchRendering,
     /// Each panel by itself.
     Grid,
     /// Panels split against the other.
@@ -161,6 +163,7 @@ pub fn entries() -> Vec<Entry> {
         entry(Menu::Render, "Step one tile", Action::StepTile, Some((NONE, Key::Period))),
         entry(Menu::Render, "Step one pass", Action::StepPass, Some((NONE, Key::Comma))),
         entry(Menu::Render, "Restart the render thread", Action::RestartWorker, None),
+        entry(Menu::View, "Real-time or progressive", Action::SwitchRendering, Some((NONE, Key::F5))),
         entry(Menu::View, "Fit", Action::Fit, Some((NONE, Key::F))),
         entry(Menu::View, "One to one", Action::OneToOne, Some((NONE, Key::Num1))),
         entry(Menu::View, "Zoom in", Action::Zoom(2.0), Some((NONE, Key::Plus))),
@@ -188,8 +191,9 @@ pub fn entries() -> Vec<Entry> {
     all
 }
 
-/// The actions whose keys were pressed in this frame; none while text is typed.
-pub fn pressed(context: &egui::Context) -> Vec<Action> {
+/// The actions whose keys were pressed in this frame; none while text is typed. Plain letters and arrows are left to the
+/// walk while the real-time view is shown (`live`).
+pub fn pressed(context: &egui::Context, live: bool) -> Vec<Action> {
     let typing = context.text_edit_focused();
     let focused = context.memory(|m| m.focused().is_some());
     let mut all = Vec::new();
@@ -200,6 +204,10 @@ pub fn pressed(context: &egui::Context) -> Vec<Action> {
         offers.sort_by_key(|(s, _)| !s.modifiers.shift);
         for (shortcut, action) in offers {
             let plain = !shortcut.modifiers.command;
+            let function = matches!(shortcut.logical_key, Key::F1 | Key::F5 | Key::Space | Key::Period);
+            if live && plain && !function {
+                continue;
+            }
             if !(typing && plain) && input.consume_shortcut(&shortcut) {
                 all.push(action);
             }
@@ -208,7 +216,7 @@ pub fn pressed(context: &egui::Context) -> Vec<Action> {
             [(Key::ArrowLeft, [-1, 0]), (Key::ArrowRight, [1, 0]), (Key::ArrowUp, [0, -1]), (Key::ArrowDown, [0, 1])]
         {
             for (modifiers, by) in [(Modifiers::SHIFT, 10), (NONE, 1)] {
-                if !focused && input.consume_key(modifiers, key) {
+                if !focused && !live && input.consume_key(modifiers, key) {
                     all.push(Action::Nudge(step.map(|s| s * by)));
                 }
             }

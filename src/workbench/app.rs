@@ -10,11 +10,12 @@ use super::inspector::{FoundPath, Inspected};
 use super::layout::{self, Pane};
 use super::messages::Messages;
 use super::panes::Panes;
+use super::realtime::LiveView;
 use super::render::Render;
 use super::watch::{self, Watch};
 use super::worker::Wake;
 use super::{bars, dialogs, theme};
-use crate::export::session::{Panel, Session};
+use crate::export::session::{Panel, Rendering, Session};
 use crate::measure::Reference;
 use egui_tiles::Tree;
 use std::path::PathBuf;
@@ -29,6 +30,12 @@ pub struct Workbench {
     pub(super) desk: Desk,
     pub(super) analysis: Analysis<Kind, Finding>,
     pub(super) tree: Tree<Pane>,
+    /// The real-time view.
+    live: LiveView,
+    /// Whether the real-time view was shown in the last frame, and whether the progressive render was paused before.
+    was_live: Option<bool>,
+    /// Whether the progressive render is that of an older session.
+    stale: bool,
     context: egui::Context,
     watch: Watch,
     /// Passes and drafts whose images have been measured.
@@ -55,6 +62,9 @@ impl Workbench {
             .unwrap_or_else(|| layout::standard(document.session.panels.len()));
         let mut workbench = Self {
             analysis: Analysis::start(Arc::clone(&wake))?,
+            live: LiveView::new(Arc::clone(&wake)),
+            was_live: None,
+            stale: false,
             render: Render::new(wake),
             gallery: Gallery::default(),
             messages: Messages::default(),
@@ -79,7 +89,9 @@ impl Workbench {
             self.styled = true;
         }
         self.take_in();
-        for action in actions::pressed(ui.ctx()) {
+        let live = self.is_live();
+        self.enter_or_leave(live);
+        for action in actions::pressed(ui.ctx(), live) {
             self.desk.ask(action);
         }
         self.desk.flipped = ui.input(|i| i.key_down(egui::Key::B)) && !ui.ctx().text_edit_focused();
@@ -90,6 +102,13 @@ impl Workbench {
         bars::top(ui, &self.document, &self.render, &mut self.desk);
         let (document, gallery) = (&self.document, &self.gallery);
         bars::status(ui, document, gallery, &self.render, &self.messages, &mut self.desk, &mut self.tree);
+        if live {
+            let Self { document, desk, messages, live, .. } = self;
+            live.poll(messages);
+            egui::CentralPanel::default().show(ui, |ui| live.ui(ui, document, desk, messages));
+            self.finish(ui);
+            return;
+        }
         egui::CentralPanel::default().frame(egui::Frame::new().fill(theme::SURROUND)).show(ui, |ui| {
             let mut panes = Panes {
                 document: &mut self.document,
@@ -104,6 +123,11 @@ impl Workbench {
                 _ => self.tree.ui(&mut panes, ui),
             }
         });
+        self.finish(ui);
+    }
+
+    /// What every frame ends with, whichever view it has shown.
+    fn finish(&mut self, ui: &mut egui::Ui) {
         dialogs::show(ui.ctx(), &mut self.document, &mut self.desk);
         self.take_dropped(ui.ctx());
         self.watch_scene(ui.ctx());
@@ -113,12 +137,44 @@ impl Workbench {
         self.ask_values();
         self.ask_photons();
         self.ask_estimates();
-        let held = ui.input(|i| i.pointer.any_down());
+        let held = ui.input(|i| i.pointer.any_down()) || self.is_live() && self.live.is_walking();
         let change = self.document.settle(held);
         self.follow(change, Step::New);
         if self.desk.unfinished {
             ui.ctx().request_repaint();
         }
+    }
+
+    /// Whether the real-time view is shown.
+    pub fn is_live(&self) -> bool {
+        self.document.session.rendering == Rendering::Realtime
+    }
+
+    /// The progressive render rests while the real-time view is shown, and goes on from the same camera and scene.
+    fn enter_or_leave(&mut self, live: bool) {
+        match (live, self.was_live) {
+            (true, None) => {
+                let paused = self.render.is_paused();
+                self.render.gate().into_iter().for_each(super::worker::gate::Gate::pause);
+                self.was_live = Some(paused);
+            }
+            (false, Some(paused)) => {
+                self.live.leave();
+                self.was_live = None;
+                if std::mem::take(&mut self.stale) {
+                    self.restart();
+                }
+                if !paused {
+                    self.render.gate().into_iter().for_each(super::worker::gate::Gate::resume);
+                }
+            }
+            _ => {}
+        }
+    }
+
+    /// The real-time view, to be told what to show.
+    pub fn live(&mut self) -> &mut LiveView {
+        &mut self.live
     }
 
     /// Takes in what the threads tell.
@@ -171,7 +227,7 @@ impl Workbench {
                         }
                     }
                     self.new_scene();
-                    self.restart();
+                    self.restart_or_note();
                 }
                 Err(why) => {
                     self.document.stay();
@@ -249,6 +305,11 @@ impl Workbench {
         self.render.start(job, &mut self.gallery, &mut self.messages);
     }
 
+    /// As [`Self::restart`], but only notes that it must be while the real-time view is shown.
+    fn restart_or_note(&mut self) {
+        if self.is_live() { self.stale = true } else { self.restart() }
+    }
+
     /// Does what a change of the session asks for.
     fn follow(&mut self, change: Result<Change, String>, step: Step) {
         let reference = self.document.reference();
@@ -257,7 +318,7 @@ impl Workbench {
         }
         match change {
             Ok(Change::None | Change::Look) => {}
-            Ok(Change::Render) => self.restart(),
+            Ok(Change::Render) => self.restart_or_note(),
             Ok(Change::Scene) => {
                 if !self.analysis.is_busy_with(&Kind::Open) {
                     let session = self.document.session.clone();
@@ -399,6 +460,8 @@ impl Workbench {
                 let change = self.document.settle_step();
                 self.follow(change, Step::Taken);
             }
+            Action::Pause if self.is_live() => self.live.play(!self.live.is_playing()),
+            Action::StepTile | Action::StepPass if self.is_live() => self.live.step(1),
             Action::Pause => {
                 if let Some(gate) = self.render.gate() {
                     if gate.is_paused() { gate.resume() } else { gate.pause() }
@@ -449,7 +512,7 @@ impl Workbench {
                     self.messages.error(why);
                 } else {
                     self.new_scene();
-                    self.restart();
+                    self.restart_or_note();
                 }
             }
             other => super::edits::apply(&other, &mut self.document.session, &mut self.desk, &self.gallery),
@@ -518,7 +581,8 @@ impl Workbench {
 
     /// Whether nothing is left to be done: all passes are rendered and the analysis thread rests.
     pub fn is_idle(&self) -> bool {
-        self.render.finished && !self.analysis.is_busy() && !self.desk.unfinished
+        let drawn = if self.is_live() { self.live.is_idle() } else { self.render.finished };
+        drawn && !self.analysis.is_busy() && !self.desk.unfinished
     }
 }
 

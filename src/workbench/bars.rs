@@ -10,7 +10,7 @@ use super::panes::widgets::name;
 use super::render::Render;
 use super::theme::{count, mono, number};
 use crate::estimate::registry::{ESTIMATORS, short_name};
-use crate::export::session::Mode;
+use crate::export::session::{Mode, Rendering};
 use crate::math::rgb::luminance;
 use crate::render::StoppedBy;
 use crate::scene::built_in::BUILT_IN;
@@ -34,6 +34,18 @@ pub fn top(ui: &mut Ui, document: &Document, render: &Render, desk: &mut Desk) {
             }
             ui.separator();
             scene_box(ui, document, desk);
+            let live = document.session.rendering == Rendering::Realtime;
+            for (title, on) in [("progressive", !live), ("real-time", live)] {
+                let tip = "passes that are averaged, or the frame loop of real-time photon mapping (F5)";
+                if ui.selectable_label(on, title).on_hover_text(tip).clicked() && !on {
+                    desk.ask(Action::SwitchRendering);
+                }
+            }
+            ui.separator();
+            // What follows belongs to the progressive view.
+            if live {
+                return;
+            }
             let paused = render.is_paused();
             let pause = ui.button(if paused { "go on" } else { "pause" });
             if pause.on_hover_text("pause or go on (Space)").clicked() {

@@ -3,6 +3,7 @@
 use super::history::History;
 use super::worker::messages::Job;
 use crate::export::session::{Panel, Session};
+use crate::realtime::RealtimeSettings;
 use crate::render::RenderSettings;
 use crate::render::memory::check_images;
 use crate::scene::scene_file::SceneFile;
@@ -162,6 +163,9 @@ impl Document {
         if change == Change::Render || !same_settings || now.size != before.size || now.seed != before.seed {
             self.settings = settings(&self.scene, now)?;
             change = Change::Render;
+        }
+        if now.realtime != before.realtime || now.seed != before.seed {
+            RealtimeSettings::new(&self.scene, &now.realtime, now.seed).map_err(|e| e.to_string())?;
         }
         if estimators(now) != estimators(before) || now.stop_rule() != before.stop_rule() {
             check_images(&self.settings, estimators(now).len()).map_err(|e| e.to_string())?;

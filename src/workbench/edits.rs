@@ -6,7 +6,7 @@ use super::dialogs::{Dialog, Purpose};
 use super::gallery::Gallery;
 use crate::estimate::registry;
 use crate::export::false_color::ColorMap;
-use crate::export::session::{Difference, Mode, Panel, Session, View};
+use crate::export::session::{Difference, Mode, Panel, Rendering, Session, View};
 
 /// Zoom of the keys, if nothing else says where.
 const LEAST_ZOOM: f32 = 1.0 / 16.0;
@@ -19,6 +19,12 @@ pub fn apply(action: &Action, session: &mut Session, desk: &mut Desk, gallery: &
         Action::Zoom(factor) => {
             let zoom = if session.view.zoom > 0.0 { session.view.zoom } else { 1.0 };
             session.view.zoom = (zoom * factor).clamp(LEAST_ZOOM, 256.0);
+        }
+        Action::SwitchRendering => {
+            session.rendering = match session.rendering {
+                Rendering::Progressive => Rendering::Realtime,
+                Rendering::Realtime => Rendering::Progressive,
+            };
         }
         Action::Grid => session.comparison.mode = Mode::Grid,
         Action::Split => toggle(&mut session.comparison.mode, Mode::Split),

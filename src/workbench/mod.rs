@@ -24,6 +24,7 @@ pub mod messages;
 pub mod overlays;
 pub mod painter;
 pub mod panes;
+pub mod realtime;
 pub mod recent;
 pub mod render;
 pub mod shot;
