@@ -4,6 +4,7 @@ use crate::cli::failure::Failure;
 use crate::cli::flags::{self, CommonFlags};
 use crate::cli::progress::{bar, interrupted, listen_for_interrupts};
 use crate::cli::{print, to_json, window};
+use crate::export::session::Rendering;
 use crate::export::{Provenance, png_file};
 use crate::workbench::Workbench;
 use crate::workbench::actions::Action;
@@ -43,6 +44,9 @@ pub struct ShotArgs {
     /// Layer of the irradiance pyramid that the overlay draws, from 0, the most detailed
     #[arg(long, value_name = "N", default_value_t = 0)]
     layer: usize,
+    /// The real-time view after so many frames, instead of the session's view
+    #[arg(long, value_name = "N")]
+    realtime: Option<u64>,
     /// Panel, from 1, that fills the middle
     #[arg(long, value_name = "N")]
     maximize: Option<usize>,
@@ -74,6 +78,9 @@ pub fn run(args: &ShotArgs) -> Result<(), Failure> {
     }
     let (mut session, path) = window::session(&args.scene, &args.flags)?;
     session.passes = args.passes;
+    if args.realtime.is_some() {
+        session.rendering = Rendering::Realtime;
+    }
     for name in &args.overlays {
         if !overlays::ALL.iter().any(|o| o.id == name) {
             let known: Vec<&str> = overlays::ALL.iter().map(|o| o.id).collect();
@@ -124,6 +131,8 @@ fn prepare(args: &ShotArgs, workbench: &mut Workbench) -> Result<(), Failure> {
         }
         workbench.run(Action::Pin(pixel));
     }
+    // The first frame is made without being asked for.
+    workbench.live().step(args.realtime.map_or(0, |n| n.saturating_sub(1)));
     workbench.show_gathering(args.ray.map(|n| n as usize - 1), args.layer);
     if let Some(panel) = args.maximize {
         workbench.run(Action::Maximize(panel - 1));

@@ -63,15 +63,16 @@ pub fn hull(points: &mut [DVec2]) -> (f64, usize) {
     (twice / 2.0, corners)
 }
 
-/// The hull's area, enlarged to that of the region from which the points come.
+/// The hull's area, enlarged so that the number of points over it is that of the region from which they come.
 ///
-/// A hull of n even points lacks a part of their region. Of n + 1 points the share that are corners is the part that a
-/// hull of n lacks (Efron 1965), so that `A (n + 1)/(n + 1 - corners)` is free of bias for Poisson points in any convex
-/// region (Baldin and Reiß 2016).
+/// A hull of n even points lacks a part of their region. Given the hull, the points inside of it that are not its corners
+/// are still spread evenly over it, in a number that knows nothing of the corners (Baldin and Reiß 2016): their number over
+/// its area is free of bias for Poisson points in any convex region. So is n over `A n/(n - corners)`. Zero if all are
+/// corners.
 fn corrected_hull(points: &mut [DVec2]) -> f64 {
     let (area, corners) = hull(points);
-    let n = points.len() as f64;
-    area * (n + 1.0) / (n + 1.0 - corners as f64)
+    let n = points.len();
+    if corners < n { area * n as f64 / (n - corners) as f64 } else { 0.0 }
 }
 
 /// Area of the smallest circle that holds the points (Welzl 1991, by moves to the front without recursion).
@@ -246,10 +247,10 @@ mod tests {
         }
     }
 
-    /// The enlarged hull of even points in a disc, a half disc and a strip has the area of the region in the mean; the
-    /// hull itself lacks a fifth and more.
+    /// Poisson points in a disc, a half disc and a strip: their number over the enlarged hull is the true density in the
+    /// mean, few or many; over the hull itself it is a third too large.
     #[test]
-    fn the_enlarged_hull_has_the_area_of_the_region() {
+    fn the_enlarged_hull_tells_the_density() {
         type Region = fn([f64; 2]) -> DVec2;
         fn disc([u, v]: [f64; 2]) -> DVec2 {
             let (x, y) = concentric_disc(u as f32, v as f32);
@@ -258,16 +259,32 @@ mod tests {
         let half: Region = |x| DVec2::new(disc(x).x, disc(x).y.abs());
         let strip: Region = |[u, v]| DVec2::new(u, 0.05 * v);
         let regions = [(disc as Region, PI), (half, PI / 2.0), (strip, 0.05)];
-        for (region, area) in regions {
-            let sets = 400;
-            let (mut plain, mut enlarged) = (0.0, 0.0);
-            for set in 0..sets {
-                let mut points: Vec<DVec2> = numbers(50, 100 + set).map(region).collect();
-                plain += hull(&mut points).0 / f64::from(sets) / area;
-                enlarged += corrected_hull(&mut points) / f64::from(sets) / area;
+        for (place, (region, area)) in (0u32..).zip(regions) {
+            for expected in [25.0, 50.0] {
+                let sets = 3000;
+                let (mut plain, mut enlarged, mut counted) = (0.0, 0.0, 0);
+                for set in 0..sets {
+                    // The number of uniform numbers whose product stays above exp(-expected).
+                    let mut left = expected;
+                    let waits = numbers(200, 10_000 * (place + 1) + 2 * set).map(|x| -libm::log(1.0 - x[0]));
+                    let n = waits
+                        .take_while(|w| {
+                            left -= w;
+                            left > 0.0
+                        })
+                        .count() as u64;
+                    let mut points: Vec<DVec2> = numbers(n, 10_000 * (place + 1) + 2 * set + 1).map(region).collect();
+                    let whole = corrected_hull(&mut points);
+                    if n >= LEAST_POINTS as u64 && whole > 0.0 {
+                        plain += n as f64 / hull(&mut points).0;
+                        enlarged += n as f64 / whole;
+                        counted += 1;
+                    }
+                }
+                let of = |sum: f64| sum / f64::from(counted) / (expected / area);
+                assert!(of(plain) > 1.2, "{}", of(plain));
+                assert!((of(enlarged) - 1.0).abs() < 0.015, "{expected}: {}", of(enlarged));
             }
-            assert!(plain < 0.82, "{plain}");
-            assert!((enlarged - 1.0).abs() < 0.02, "{enlarged}");
         }
     }
 

@@ -34,7 +34,7 @@ pub enum Search {
 pub enum Area {
     /// The disc whose radius is that of the search.
     Disc,
-    /// The convex hull of the photons, enlarged by the share that their corners of it tell is missing.
+    /// The convex hull of the photons, enlarged by the part that it lacks, which its corners tell.
     Hull,
     /// The convex hull itself.
     HullAsPublished,
@@ -338,7 +338,7 @@ impl RealtimeSettings {
                 &[Search::Sphere, Search::Cylinder, Search::Ellipsoid],
             )?,
             incoming_direction: pick.switch(|f| f.incoming_direction, true),
-            slice_height: pick.number("slice_height", |f| f.slice_height, 0.05)? as f32,
+            slice_height: pick.number("slice_height", |f| f.slice_height, 0.02)? as f32,
             area: pick.word(
                 "area",
                 |f| f.area.as_deref(),

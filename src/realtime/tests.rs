@@ -295,6 +295,35 @@ fn irradiance_is_that_of_the_closed_form() {
     }
 }
 
+/// Reflections by every distribution keep the mean irradiance of a box's walls, few directions at a time too.
+#[test]
+fn every_distribution_of_reflections_is_free_of_bias() {
+    let scene = Arc::new(open("cornell").expect("built in"));
+    let power_on_walls = |kind: &str, children: &str| {
+        let texts =
+            ["mesh_refinement=0", "accumulation_frames=2", "photons_from_light=6000", "store_direct_light=false"];
+        let s = settings(&scene, &[&texts[..], &[kind, children]].concat());
+        let mut e = Engine::new(&scene, s);
+        (0..2).for_each(|_| e.step(0.0, &scene.camera));
+        // Power by the height at which it arrives, in thirds.
+        let mut sums = [0.0f64; 3];
+        for p in e.map().photons() {
+            let at = ((p.position.y + 1.0) * 1.5).clamp(0.0, 2.9) as usize;
+            sums[at] += f64::from(p.power.x);
+        }
+        sums
+    };
+    let expected = power_on_walls("diffuse_distribution=explicit", "diffuse_reflections=16");
+    for kind in ["rejection", "saff_kuijlaars", "spiral", "stratified", "sobol"] {
+        for children in ["diffuse_reflections=1", "diffuse_reflections=3"] {
+            let found = power_on_walls(&format!("diffuse_distribution={kind}"), children);
+            for (a, b) in found.iter().zip(expected) {
+                assert!((a / b - 1.0).abs() < 0.04, "{kind} {children}: {found:?} {expected:?}");
+            }
+        }
+    }
+}
+
 /// The radius of eq. 3.7, and that a place without photons is dark.
 #[test]
 fn searches_reach_as_far_as_they_should() {

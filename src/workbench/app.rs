@@ -535,6 +535,7 @@ impl Workbench {
     /// window is idle, the same session gives the same picture.
     pub fn for_pictures(&mut self) {
         self.desk.untimed = true;
+        self.live.play(false);
     }
 
     /// Chooses a gather ray of the pixel that is pinned next, by its place in the list from 0, and the layer of the irradiance

@@ -7,6 +7,7 @@ mod acts;
 mod gathering;
 mod painter;
 mod pictures;
+mod realtime;
 mod refusals;
 mod renderer;
 mod threads;

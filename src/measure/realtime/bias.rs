@@ -6,7 +6,7 @@
 
 use crate::measure::Reference;
 use crate::measure::realtime::statistics::median;
-use crate::photons::irradiance::surface_area::SurfaceAreas;
+use crate::realtime::distribution::Distribution;
 use crate::realtime::estimate::{Estimator, Scratch};
 use crate::realtime::settings::{Area, Search};
 use crate::realtime::{Engine, RealtimeSettings};
@@ -86,12 +86,38 @@ impl Region {
 }
 
 /// A place with its true irradiance.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Probe {
     position: Vec3,
     normal: Vec3,
     region: Region,
     truth: f64,
+    reach: f32,
+    /// How many of the first points of [`around`] lie on the surface itself where photons can arrive.
+    open: Arc<Vec<u32>>,
+}
+
+impl Probe {
+    /// Area of the surface itself within a radius up to the probe's reach, where photons can arrive, m².
+    fn area(&self, radius: f32) -> f64 {
+        let disc = PI * f64::from(radius).powi(2);
+        let share = f64::from(radius / self.reach).min(1.0).powi(2);
+        let n = ((share * f64::from(POINTS)) as usize).clamp(1, POINTS as usize);
+        disc * f64::from(self.open[n - 1]) / n as f64
+    }
+}
+
+/// Points of a disc by which the area of a surface within it is told.
+const POINTS: u32 = 1024;
+
+/// Points of the unit disc in the order of their radius: of the first n all have the same share of its area.
+fn around() -> impl Iterator<Item = (f32, f32)> {
+    Distribution::Spiral.set(POINTS as usize, 0).into_iter().map(|[u, v]| {
+        // From the rim of the spiral's sphere to the middle of the disc.
+        let (s, c) = crate::math::elementary::sin_cos(std::f32::consts::TAU * v);
+        let r = (1.0 - u).max(0.0).sqrt();
+        (r * c, r * s)
+    })
 }
 
 /// Means over the places of a region, relative to their mean true irradiance.
@@ -195,8 +221,13 @@ pub fn probes(scene: &Scene, reference: &Reference, reach: f32, step: usize) -> 
             // The mean of the channels of the irradiance: E = π L/ρ.
             let e = (reference.image.pixels[at] / reflectance).as_dvec3() * PI;
             let truth = (e.x + e.y + e.z) / 3.0;
-            let region = region(scene, &intersector, &surface, reach)?;
-            Some(Probe { position: surface.position, normal: surface.normal, region, truth })
+            let open = Arc::new(open(scene, &intersector, &surface, reach));
+            let whole = open.last() == Some(&POINTS);
+            let region = match region(scene, &intersector, &surface, reach)? {
+                Region::Interior | Region::Shadow if !whole => Region::Edge,
+                other => other,
+            };
+            Some(Probe { position: surface.position, normal: surface.normal, region, truth, reach, open })
         })
         .collect()
 }
@@ -204,6 +235,27 @@ pub fn probes(scene: &Scene, reference: &Reference, reach: f32, step: usize) -> 
 /// Whether a photon or hit lies on the surface itself, and not on another.
 fn in_one_plane(surface: &Surface, position: Vec3, normal: Vec3, scene: &Scene) -> bool {
     surface.normal.dot(normal) > 0.999 && (position - surface.position).dot(surface.normal).abs() < 1e-4 * scene.radius
+}
+
+/// How many of the first points around a place lie on its surface and not under another body, for every number of them.
+fn open(scene: &Scene, intersector: &Intersector, surface: &Surface, reach: f32) -> Vec<u32> {
+    let (x, y) = crate::math::frame::tangents(surface.normal);
+    let lift = scene.radius * 1e-4;
+    let mut count = 0;
+    around()
+        .map(|(a, b)| {
+            let origin = surface.position + (x * a + y * b) * reach + surface.normal * lift;
+            let met = |direction: Vec3| {
+                let ray = Ray { origin, direction };
+                intersector.closest(&ray).map(|h| (h.t, Surface::new(scene, &ray, &h).front))
+            };
+            let on_it = met(-surface.normal).is_some_and(|(t, _)| t < 2.0 * lift);
+            // Under a body the way up meets its inside.
+            let covered = met(surface.normal).is_some_and(|(_, front)| !front);
+            count += u32::from(on_it && !covered);
+            count
+        })
+        .collect()
 }
 
 /// Directions in the surface along which a region is explored.
@@ -281,7 +333,6 @@ pub fn bias(
     repeats: u32,
     mut watch: impl FnMut() -> bool,
 ) -> Option<BiasReport> {
-    let areas = SurfaceAreas::new(scene);
     let mut sums = vec![[Sum::default(); VARIANTS.len()]; probes.len()];
     let mut photons = 0;
     let mut last = None;
@@ -293,7 +344,7 @@ pub fn bias(
             let s = variant.of(settings);
             let estimator = Estimator::new(scene, engine.world(), engine.map(), &s);
             sums.par_iter_mut().zip(probes).for_each_init(Scratch::default, |scratch, (sums, probe)| {
-                sums[v].add(&estimator, &engine, &areas, probe, s.max_search_count, scratch);
+                sums[v].add(&estimator, &engine, probe, s.max_search_count, scratch);
             });
         }
         photons = engine.map().photons().len();
@@ -324,15 +375,7 @@ struct Sum {
 }
 
 impl Sum {
-    fn add(
-        &mut self,
-        estimator: &Estimator,
-        engine: &Engine,
-        areas: &SurfaceAreas,
-        probe: &Probe,
-        k: u32,
-        scratch: &mut Scratch,
-    ) {
+    fn add(&mut self, estimator: &Estimator, engine: &Engine, probe: &Probe, k: u32, scratch: &mut Scratch) {
         let found = estimator.direct_gathering(probe.position, probe.normal, scratch);
         let (photons, radius) = (engine.map().photons(), engine.scene().radius);
         let (mut all, mut own) = (0.0, 0.0);
@@ -345,7 +388,7 @@ impl Sum {
                 && (p.position - probe.position).dot(probe.normal).abs() < 1e-4 * radius;
             own += if in_plane { power } else { 0.0 };
         }
-        let area = areas.within(probe.position, probe.normal, found.radius).max(f64::MIN_POSITIVE);
+        let area = probe.area(found.radius).max(f64::MIN_POSITIVE);
         self.estimate += all / found.area;
         self.own += own / found.area;
         self.over_true_area += own / area;
@@ -433,7 +476,7 @@ mod tests {
         for region in Region::ALL {
             assert!(probes.iter().filter(|p| p.region == region).count() > 4, "{region:?}");
         }
-        let report = bias(&scene, &settings, &probes, 8, 1, || true).expect("not stopped");
+        let report = bias(&scene, &settings, &probes, 16, 1, || true).expect("not stopped");
         for r in &report.rows {
             let p = r.parts;
             assert!((p.total - (p.surface + p.boundary + p.count + p.distance)).abs() < 1e-9);

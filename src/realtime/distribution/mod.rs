@@ -43,7 +43,7 @@ impl Distribution {
 
     /// `count` points of the unit square `[0, 1)²`; another `seed` gives another set of the same kind.
     ///
-    /// The spirals are one set each, which a seed other than 0 turns about the axis.
+    /// The spirals are one set each for the seed 0; another seed shifts its points.
     pub fn set(self, count: usize, seed: u64) -> Vec<[f32; 2]> {
         match self {
             Self::Rejection => sets::rejection(count, seed),

@@ -80,11 +80,14 @@ pub(super) fn sobol(count: usize, seed: u64) -> Vec<[f32; 2]> {
     (0..count as u64).map(|i| numbers.four(i, 0)).map(|x| [x[0], x[1]]).collect()
 }
 
-/// The point of height `h` in -1 to 1 and of `turn` in turns, turned further by a seed that is not 0.
+/// The point of height `h` in -1 to 1 and of `turn` in turns. A seed that is not 0 shifts all points of a set alike, in
+/// height and azimuth, around the square's edges (Cranley and Patterson 1976): then each of them is spread evenly over all
+/// seeds, which a few points of a spiral are not.
 fn turned(h: f64, turn: f64, seed: u64) -> [f32; 2] {
-    let more = if seed == 0 { 0.0 } else { f64::from(Sequence::new(Sampling::Random, seed).four(0, 0)[0]) };
-    let turn = turn + more;
-    square((1.0 - h) / 2.0, turn - turn.floor())
+    let shift = if seed == 0 { [0.0; 4] } else { Sequence::new(Sampling::Random, seed).four(0, 0) };
+    let (u, v) = ((1.0 - h) / 2.0 + f64::from(shift[1]), turn + f64::from(shift[0]));
+    // The lower pole is the upper one then, but without a shift it stays.
+    square(if seed == 0 { u } else { u - u.floor() }, v - v.floor())
 }
 
 /// Largest number in 32 bits below 1.

@@ -1,6 +1,6 @@
 //! `realtime-figure-6.1` to `6.9`: the paper's pictures.
 
-use super::panels::{Against, Panel, Shown, csv, draw, make, picture, reference, text};
+use super::panels::{Against, Panel, Shown, csv, draw, make, picture, reference, still, text};
 use super::{origin, parameters, rooms};
 use crate::cli::failure::Failure;
 use crate::cli::paper::PaperFlags;
@@ -87,7 +87,14 @@ fn in_the_box(f: &Figure, panels: &[Panel], flags: &PaperFlags, folder: &Path) -
 pub fn run_1(item: &'static str, flags: &PaperFlags, folder: &Path) -> Result<Done, Failure> {
     let common = [
         &IN_THE_BOX[..],
-        &["photons_from_light=500", "diffuse_reflections=3", "max_search_radius=0.3", "incoming_direction=false"],
+        &[
+            "photons_from_light=700",
+            "scattering=roulette",
+            "recursion_depth=20",
+            "diffuse_reflections=3",
+            "max_search_radius=0.3",
+            "incoming_direction=false",
+        ],
     ]
     .concat();
     let f = Figure {
@@ -141,7 +148,7 @@ fn dense(
     name: &str,
 ) -> Result<Against, Failure> {
     let settings = parameters(scene, flags, texts)?;
-    let (image, ..) = picture(scene, settings, &scene.camera, size, 1.0);
+    let image = still(scene, settings, &scene.camera, size);
     Ok(Against { image, mask: Mask::all(size), name: name.into() })
 }
 
@@ -289,7 +296,8 @@ fn lit_from_below() -> Result<(Arc<Scene>, Camera), Failure> {
     scene.motions.clear();
     let floor = scene.geometry.positions.iter().map(|p| p.y).fold(f32::INFINITY, f32::min);
     scene.lights = vec![Light::Spot {
-        position: Vec3::new(0.0, floor + 1.0, 0.0),
+        // Above the box that stands there.
+        position: Vec3::new(0.0, floor + 1.8, 0.0),
         direction: Vec3::Y,
         cos_half: libm::cos(0.7),
         falloff: 0.0,
@@ -325,8 +333,8 @@ fn refinement(f: &Figure, triangles: &[u32], flags: &PaperFlags, folder: &Path) 
     let many = [
         &common[..],
         &[
-            "photons_from_light=20000",
-            "mesh_refinement=100000",
+            "photons_from_light=5000",
+            "mesh_refinement=60000",
             "max_search_count=1000",
             "light_distribution=sobol",
             "diffuse_distribution=sobol",
@@ -334,9 +342,9 @@ fn refinement(f: &Figure, triangles: &[u32], flags: &PaperFlags, folder: &Path) 
     ]
     .concat();
     let dense = parameters(&scene, flags, &many)?;
-    let (image, ..) = picture(&scene, dense, &camera, size, 1.0);
+    let image = still(&scene, dense, &camera, size);
     let against =
-        Against { image, mask: Mask::all(size), name: "engine with 100,000 triangles and 2 million photons".into() };
+        Against { image, mask: Mask::all(size), name: "engine with 60,000 triangles and 500,000 photons".into() };
     let titles: Vec<String> = triangles.iter().map(|t| format!("{t} triangles")).collect();
     let panels: Vec<Panel> = triangles
         .iter()

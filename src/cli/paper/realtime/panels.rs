@@ -76,6 +76,13 @@ impl Against {
     }
 }
 
+/// A picture of the engine with its map full.
+pub(super) fn still(scene: &Arc<Scene>, settings: RealtimeSettings, camera: &Camera, size: [u32; 2]) -> Image {
+    let mut engine = Engine::new(scene, settings);
+    (0..engine.settings().accumulation_frames).for_each(|_| engine.step(0.0, camera));
+    engine.draw(camera, size, 1.0)
+}
+
 /// A picture of the engine with its map full, and the median seconds of some frames more.
 pub(super) fn picture(
     scene: &Arc<Scene>,
