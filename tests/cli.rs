@@ -41,7 +41,9 @@ fn wrong_calls_are_refused_in_one_line() {
     for (args, part) in [
         (vec!["compare", "nowhere", "--out", o], "built in: ring"),
         (vec!["compare", "missing.toml", "--out", o], "no such file"),
-        (vec!["compare", "map.bsp", "--out", o], "cannot be read yet"),
+        (vec!["compare", "map.bsp", "--out", o], "map.bsp: cannot be read: no such file"),
+        (vec!["compare", "tests/corpus/map/cut_off.bsp", "--out", o], "is it cut off?"),
+        (vec!["compare", "tests/corpus/map/room.pk3:hall", "--out", o], "no map `hall` in the archive; there are room"),
         (vec!["compare", "ring", "--photons", "0", "--out", o], "--photons: must lie in 1"),
         (vec!["compare", "ring", "--photons", "-5", "--out", o], "--photons: must lie in 1"),
         (vec!["compare", "ring", "--photons", "nan", "--out", o], "--photons"),
@@ -463,4 +465,31 @@ fn shot_draws_the_window() {
     refused(&["shot", "-o", o, "--maximize", "2", "--final-gather", "classic"], 2, "numbered 1 to 1");
     refused(&["shot", "-o", o, "nowhere"], 2, "built in: ring");
     assert!(!out.exists());
+}
+
+/// A Quake 3 map is a scene like others: rendered, with its triangles told, and in real time.
+#[test]
+fn maps_are_scenes() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let image = folder.path().join("room.png");
+    let out =
+        cusp(&["render", "tests/corpus/map/room.pk3:room", "-o", path(&image), "--size", "32x24", "--photons", "5000"]);
+    assert!(out.status.success(), "{}", text(&out.stderr));
+    assert!(
+        text(&out.stderr).contains("51 triangles in the map, 45 of them read; left out: 2 not drawn, 2 sky, 2 trigger")
+    );
+    let pixels = image::open(&image).expect("a picture").to_rgb8();
+    assert!(pixels.pixels().filter(|p| p[0] > 60).count() > 300);
+    let out = cusp(&[
+        "realtime",
+        "tests/corpus/map/room.bsp",
+        "--frames",
+        "3",
+        "--size",
+        "32x24",
+        "--json",
+        "--set",
+        "partition=cell",
+    ]);
+    assert!(out.status.success(), "{}", text(&out.stderr));
 }

@@ -40,7 +40,7 @@ const CROP: [u32; 2] = [128, 96];
 /// Flags of `compare`.
 #[derive(Debug, Args)]
 pub struct CompareArgs {
-    /// A built-in name, a .toml, an .obj or a session
+    /// A built-in name, a .toml, an .obj, a Quake 3 map (.bsp, .pk3:NAME) or a session
     scene: String,
     /// Estimators, separated by commas; all with their defaults if left out
     #[arg(long, value_name = "A,B")]

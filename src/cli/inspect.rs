@@ -19,7 +19,7 @@ use std::sync::Arc;
 /// Flags of `inspect`.
 #[derive(Debug, Args)]
 pub struct InspectArgs {
-    /// A built-in name, a .toml or an .obj
+    /// A built-in name, a .toml, an .obj or a Quake 3 map (.bsp, .pk3:NAME)
     scene: String,
     /// Column and row of the pixel, from 0; row 0 is the top
     #[arg(long, value_name = "X,Y", value_parser = pixel, allow_hyphen_values = true)]

@@ -32,7 +32,7 @@ use std::process::ExitCode;
 struct Cli {
     #[command(subcommand)]
     command: Option<Command>,
-    /// Opens the workbench on a built-in scene, a .toml, an .obj or a session; without a display it compares instead
+    /// Opens the workbench on a built-in scene, a .toml, an .obj, a Quake 3 map (.bsp, .pk3:NAME) or a session; without a display it compares instead
     scene: Option<String>,
     #[command(flatten)]
     flags: CommonFlags,

@@ -24,7 +24,7 @@ pub const SIZE: [u32; 2] = [320, 240];
 /// Flags of `realtime`.
 #[derive(Debug, Args)]
 pub struct RealtimeArgs {
-    /// A built-in name, a .toml, an .obj, a .bsp or a .pk3; `rooms` if left out
+    /// A built-in name, a .toml, an .obj or a Quake 3 map (.bsp, .pk3:NAME); `rooms` if left out
     #[arg(default_value = "rooms")]
     scene: String,
     /// Frames to make

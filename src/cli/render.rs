@@ -20,7 +20,7 @@ use std::time::{Duration, Instant};
 /// Flags of `render`.
 #[derive(Debug, Args)]
 pub struct RenderArgs {
-    /// A built-in name, a .toml or an .obj
+    /// A built-in name, a .toml, an .obj or a Quake 3 map (.bsp, .pk3:NAME)
     scene: String,
     /// The image: .exr (linear radiance) or .png
     #[arg(short = 'o', long = "output", value_name = "FILE")]

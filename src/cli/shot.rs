@@ -20,7 +20,7 @@ const SIDES: std::ops::RangeInclusive<u32> = 200..=8192;
 /// Flags of `shot`.
 #[derive(Debug, Args)]
 pub struct ShotArgs {
-    /// A built-in name, a .toml, an .obj or a session
+    /// A built-in name, a .toml, an .obj, a Quake 3 map (.bsp, .pk3:NAME) or a session
     #[arg(default_value = "ring")]
     scene: String,
     /// The picture: .png

@@ -34,7 +34,7 @@ const PASSES: u32 = 32;
 /// Flags of `study`.
 #[derive(Debug, Args)]
 pub struct StudyArgs {
-    /// A built-in name, a .toml or an .obj
+    /// A built-in name, a .toml, an .obj or a Quake 3 map (.bsp, .pk3:NAME)
     scene: String,
     /// Estimators, separated by commas; all with their defaults if left out
     #[arg(long, value_name = "A,B")]
