@@ -36,10 +36,10 @@ pub fn area(
     (area > 0.0).then_some(area)
 }
 
-/// Area of the convex hull, and how many of the points are its corners. Orders the points.
-pub fn hull(points: &mut [DVec2]) -> (f64, usize) {
+/// Area of the convex hull, and its corners. Orders the points.
+pub fn hull(points: &mut [DVec2]) -> (f64, Vec<DVec2>) {
     points.sort_unstable_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
-    let (mut twice, mut corners) = (0.0, 0);
+    let (mut twice, mut corners) = (0.0, Vec::with_capacity(32));
     // The lower chain from left to right, then the upper one back (Andrew 1979).
     let mut chain: Vec<DVec2> = Vec::with_capacity(32);
     for upper in [false, true] {
@@ -58,20 +58,24 @@ pub fn hull(points: &mut [DVec2]) -> (f64, usize) {
             points.iter().for_each(|p| add(*p))
         }
         twice += chain.windows(2).map(|w| w[0].perp_dot(w[1])).sum::<f64>();
-        corners += chain.len().saturating_sub(1);
+        // The end of each chain is the start of the other.
+        corners.extend(chain.split_last().map_or(&[][..], |(_, rest)| rest));
     }
     (twice / 2.0, corners)
 }
 
-/// The hull's area, enlarged so that the number of points over it is that of the region from which they come.
+/// Area of the hull of the points and of the origin, where the estimate is made, enlarged so that the number of points over
+/// it is that of the region from which they come.
 ///
 /// A hull of n even points lacks a part of their region. Given the hull, the points inside of it that are not its corners
 /// are still spread evenly over it, in a number that knows nothing of the corners (Baldin and Reiß 2016): their number over
-/// its area is free of bias for Poisson points in any convex region. So is n over `A n/(n - corners)`. Zero if all are
-/// corners.
-fn corrected_hull(points: &mut [DVec2]) -> f64 {
-    let (area, corners) = hull(points);
+/// its area is free of bias for Poisson points in any convex region that holds the origin. So is n over `A n/(n - corners)`.
+/// Without the origin a place in the dark beside a lit strip would be as bright as the strip. Zero if all are corners.
+fn corrected_hull(points: &mut Vec<DVec2>) -> f64 {
     let n = points.len();
+    points.push(DVec2::ZERO);
+    let (area, corners) = hull(points);
+    let corners = corners.iter().filter(|c| **c != DVec2::ZERO).count();
     if corners < n { area * n as f64 / (n - corners) as f64 } else { 0.0 }
 }
 
@@ -198,7 +202,7 @@ mod tests {
             .flat_map(|p| [p, DVec2::new(4.0 - p.x, p.y), DVec2::new(p.x, 2.0 - p.y), DVec2::new(4.0, 2.0) - p]);
         let mut points = turned(corners.into_iter().chain(even), 0.7);
         let (area, count) = hull(&mut points);
-        assert!((area - 8.0).abs() < 1e-9 && count == 4, "{area} {count}");
+        assert!((area - 8.0).abs() < 1e-9 && count.len() == 4, "{area} {count:?}");
         assert!((oriented_box(&points) - 8.0).abs() < 1e-6);
         assert!((smallest_circle(&points) - PI * 5.0).abs() < 1e-6);
         assert!(ellipse(&points) > 8.0);
@@ -222,9 +226,9 @@ mod tests {
                 !all.iter().any(|q| *q != p && all.iter().all(|r| (*q - p).perp_dot(*r - p) >= 0.0))
             };
             let corners = points.iter().filter(|p| !inside(**p, &points)).count();
-            assert_eq!(hull(&mut points).1, corners);
+            assert_eq!(hull(&mut points).1.len(), corners);
         }
-        assert_eq!(hull(&mut []).1, 0);
+        assert!(hull(&mut []).1.is_empty());
         assert_eq!(hull(&mut [DVec2::X; 9]).0, 0.0);
     }
 
@@ -257,7 +261,7 @@ mod tests {
             DVec2::new(f64::from(x), f64::from(y))
         }
         let half: Region = |x| DVec2::new(disc(x).x, disc(x).y.abs());
-        let strip: Region = |[u, v]| DVec2::new(u, 0.05 * v);
+        let strip: Region = |[u, v]| DVec2::new(u - 0.3, 0.05 * v);
         let regions = [(disc as Region, PI), (half, PI / 2.0), (strip, 0.05)];
         for (place, (region, area)) in (0u32..).zip(regions) {
             for expected in [25.0, 50.0] {
@@ -274,7 +278,7 @@ mod tests {
                         })
                         .count() as u64;
                     let mut points: Vec<DVec2> = numbers(n, 10_000 * (place + 1) + 2 * set + 1).map(region).collect();
-                    let whole = corrected_hull(&mut points);
+                    let whole = corrected_hull(&mut points.clone());
                     if n >= LEAST_POINTS as u64 && whole > 0.0 {
                         plain += n as f64 / hull(&mut points).0;
                         enlarged += n as f64 / whole;
@@ -286,6 +290,14 @@ mod tests {
                 assert!((of(enlarged) - 1.0).abs() < 0.015, "{expected}: {}", of(enlarged));
             }
         }
+    }
+
+    /// Points of a strip far from the origin: the way there counts.
+    #[test]
+    fn a_place_beside_a_lit_strip_is_not_in_it() {
+        let mut strip: Vec<DVec2> = numbers(50, 7).map(|[x, y]| DVec2::new(1.0 + 0.05 * x, y - 0.5)).collect();
+        let (alone, _) = hull(&mut strip.clone());
+        assert!(alone < 0.05 && corrected_hull(&mut strip) > 10.0 * alone);
     }
 
     #[test]

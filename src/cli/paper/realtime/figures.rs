@@ -221,7 +221,11 @@ pub fn run_4(item: &'static str, flags: &PaperFlags, folder: &Path) -> Result<Do
         panel("direct light in the map", &common, &["store_direct_light=true"]),
         panel("indirect light alone", &common, &["store_direct_light=false"]),
     ];
-    in_the_box(&f, &panels, flags, folder)
+    // Light straight from the lamp is not gathered, so that no reference shows the same.
+    let scene = Arc::new(open("cornell")?);
+    let size = flags.size.unwrap_or(BOX);
+    let shown = make(&scene, flags, &scene.camera, size, &panels, None)?;
+    finish(&f, &scene, flags, folder, &shown, None)
 }
 
 /// The number of emitted photons for which a frame takes about `seconds`, by proportion to one that was measured.
