@@ -73,7 +73,7 @@ fn biases_are_told_apart() {
 /// Coherent numbers leave at most a tenth of the fluctuation away from what moves, by every distribution.
 #[test]
 fn coherent_numbers_calm_all_distributions() {
-    let (json, csv) = run("realtime-fluctuation", &[]);
+    let (json, csv) = run("realtime-fluctuation", &["--photons", "200"]);
     assert_eq!(csv.lines().count(), 1 + 6);
     for r in json["rows"].as_array().expect("rows") {
         assert!(number(&r["reduction"][1]) > 0.9 && number(&r["incoherent"][1]) > 0.01, "{r}");

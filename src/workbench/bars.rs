@@ -176,6 +176,9 @@ pub fn status(
     Panel::bottom("status").show(ui, |ui| {
         ui.horizontal(|ui| {
             match readout(document, gallery, render, desk) {
+                _ if document.session.rendering == Rendering::Realtime => {
+                    ui.weak("W A S D and the arrows walk, Space plays, F5 goes back to the progressive view.")
+                }
                 Some(text) => ui.label(mono(text)),
                 None if render.progress.is_none() && messages.all().is_empty() => {
                     ui.weak("Hover a pixel, click to pin it, hold B to compare; Ctrl+P lists every action.")

@@ -96,7 +96,7 @@ pub fn scene_from_map(file: &Path, map: Option<&str>, files: &Files) -> Checked<
     if let Some(map) = map {
         name = format!("{name}:{map}");
     }
-    let shape = ShapeFile { kind: "mesh".into(), file: Some(name.clone()), ..Default::default() };
+    let shape = ShapeFile { kind: "mesh".into(), file: Some(name), ..Default::default() };
     let mut loader = Loader::new(Locator::new(file, ""), files);
     loader.shape("mesh", &shape)?;
     let (center, radius) = loader.assembly.bounds();

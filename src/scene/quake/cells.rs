@@ -39,7 +39,7 @@ impl Cells {
         let note = visibility.is_none().then(|| "the map tells no visibility; all of its cells see all".to_owned());
         let most = leaves.iter().copied().max().unwrap_or(-1);
         let (clusters, row, visible) = match visibility {
-            Some((clusters, row, rows)) => (clusters as u32, row, rows[..clusters * row].to_vec()),
+            Some(v) => (v.clusters as u32, v.row, v.rows[..v.clusters * v.row].to_vec()),
             None => ((most + 1).max(0) as u32, 0, Vec::new()),
         };
         if i64::from(most) >= i64::from(clusters) {

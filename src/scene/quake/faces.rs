@@ -96,7 +96,7 @@ impl Builder<'_> {
         let vertices = vertices?;
         match face.kind {
             POLYGON | MESH => {
-                if face.meshverts % 3 != 0 {
+                if !face.meshverts.is_multiple_of(3) {
                     let n = face.meshverts;
                     return Err(MapError(format!("faces[{index}]: {n} meshverts are no whole number of triangles")));
                 }

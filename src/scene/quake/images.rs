@@ -14,16 +14,14 @@ pub struct Images {
 
 impl Images {
     /// In `own` archive, at `path`, and its neighbours; or in `folder` and the archives there.
-    pub(super) fn new(own: Option<Archive>, path: Option<PathBuf>, folder: Option<PathBuf>) -> Self {
+    pub(super) fn new(own: Option<Archive>, path: Option<&Path>, folder: Option<PathBuf>) -> Self {
         let mut archives: Vec<Archive> = own.into_iter().collect();
-        let beside = path.as_deref().and_then(Path::parent).map(Path::to_owned).or_else(|| folder.clone());
+        let beside = path.and_then(Path::parent).map(Path::to_owned).or_else(|| folder.clone());
         let mut others: Vec<PathBuf> = beside
             .and_then(|b| std::fs::read_dir(b).ok())
             .map(|all| all.filter_map(|e| Some(e.ok()?.path())).collect())
             .unwrap_or_default();
-        others.retain(|p| {
-            p.extension().is_some_and(|e| e.eq_ignore_ascii_case("pk3")) && Some(p.as_path()) != path.as_deref()
-        });
+        others.retain(|p| p.extension().is_some_and(|e| e.eq_ignore_ascii_case("pk3")) && Some(p.as_path()) != path);
         // Later archives win in the game.
         others.sort_unstable_by(|a, b| b.cmp(a));
         archives.extend(others.iter().filter_map(|p| Archive::open(p)));

@@ -89,6 +89,15 @@ pub(super) struct NodeRecord {
     pub(super) children: [i32; 2],
 }
 
+/// A row of bits for each cluster, one for each that it may see.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Visibility<'a> {
+    pub(super) clusters: usize,
+    /// Bytes of a row.
+    pub(super) row: usize,
+    pub(super) rows: &'a [u8],
+}
+
 fn wrong<T>(what: impl Into<String>) -> Result<T, MapError> {
     Err(MapError(what.into()))
 }
@@ -290,8 +299,8 @@ impl<'a> Lumps<'a> {
         self.leafs.chunks_exact(48).map(|r| int(r, 0)).collect()
     }
 
-    /// Number of clusters, bytes of the row of each, and the rows; None if the map has none.
-    pub(super) fn visibility(&self) -> Result<Option<(usize, usize, &'a [u8])>, MapError> {
+    /// Which clusters see which; None if the map does not tell.
+    pub(super) fn visibility(&self) -> Result<Option<Visibility<'a>>, MapError> {
         if self.visdata.len() < 8 {
             return Ok(None);
         }
@@ -303,6 +312,6 @@ impl<'a> Lumps<'a> {
         if clusters.checked_mul(row).is_none_or(|n| n > rows.len()) || row * 8 < clusters {
             return wrong(format!("lump visdata: {clusters} rows of {row} bytes are not in its {} bytes", rows.len()));
         }
-        Ok(Some((clusters, row, rows)))
+        Ok(Some(Visibility { clusters, row, rows }))
     }
 }

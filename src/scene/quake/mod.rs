@@ -80,7 +80,8 @@ pub fn open(
     let (bytes, images) = if is_archive {
         let mut archive = pk3::Archive::new(bytes).map_err(wrong)?;
         let map = archive.map(map).map_err(wrong)?;
-        (map, Images::new(Some(archive), folder.map(|f| f.join(file)), None))
+        let at = folder.map(|f| f.join(file));
+        (map, Images::new(Some(archive), at.as_deref(), None))
     } else {
         // Archives and loose images lie in the folder above `maps`.
         let above = folder.map(|f| f.join(file)).and_then(|p| Some(p.parent()?.parent()?.to_owned()));

@@ -47,7 +47,10 @@ pub fn run(item: &'static str, flags: &PaperFlags, folder: &Path) -> Result<Done
         if interrupted() {
             return Err(stopped(item));
         }
+        // The flag is the number that a frame emits.
+        let emitted = flags.photons.or(scene.realtime.photons_from_light).unwrap_or(200).clamp(1, 100_000);
         let texts = [
+            format!("photons_from_light={emitted}"),
             format!("light_distribution={}", kind.name()),
             format!("diffuse_distribution={}", kind.name()),
             "mesh_refinement=3000".to_owned(),
