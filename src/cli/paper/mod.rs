@@ -45,7 +45,7 @@ pub struct PaperFlags {
     /// Size of the image in pixels; if left out 512x512 for the thesis, 64x64 for gather-table, 96x96 for its figures 4 and 5
     #[arg(long, value_name = "WxH", value_parser = size)]
     size: Option<[u32; 2]>,
-    /// Photons emitted; if left out 446300 for the thesis, which store the published 4978 caustic ones, 1e6 for gather-table; of the realtime items bias, fluctuation and figure-6.3 take it
+    /// Photons emitted; if left out 446300 for the thesis, which store the published 4978 caustic ones, 1e6 for gather-table; of the realtime items bias, fluctuation and figures 6.3, 6.5 and 6.6 take it
     #[arg(long, value_name = "N", value_parser = count, allow_negative_numbers = true)]
     photons: Option<i64>,
     /// Factor on the axes of all photon footprints; 8.86 if left out: the published size times the listing's smoothing
