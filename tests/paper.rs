@@ -215,3 +215,25 @@ fn empty_and_tiny_cases_are_defined() {
         }
     }
 }
+
+/// Ctrl-C ends it cleanly, with exit code 130 and no part of an item.
+#[cfg(unix)]
+#[test]
+fn an_interrupted_item_leaves_nothing() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = folder.path().join("part");
+    let child = Command::new(env!("CARGO_BIN_EXE_cusp"))
+        .args(["paper", "figure-16", "--size", "4096x4096", "--photons", "1000", "--out"])
+        .arg(&out)
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the binary runs");
+    std::thread::sleep(std::time::Duration::from_secs(2));
+    let killed = Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("kill runs");
+    assert!(killed.success());
+    let run = child.wait_with_output().expect("ends");
+    assert_eq!(run.status.code(), Some(130), "{}", text(&run.stderr));
+    assert!(text(&run.stderr).contains("nothing of figure-16 was written"), "{}", text(&run.stderr));
+    assert!(!out.exists());
+}
