@@ -113,15 +113,22 @@ impl Engine {
         Self::with_mesh(scene, settings, mesh)
     }
 
+    /// Whether a scene differs from the engine's in nothing but its camera.
+    pub fn shows(&self, scene: &Scene) -> bool {
+        Arc::ptr_eq(&scene.geometry, &self.scene.geometry)
+            && scene.motions == self.scene.motions
+            && scene.lights == self.scene.lights
+            && same_materials(scene, &self.scene)
+    }
+
     /// Goes on with another scene or other settings; keeps the mesh while it serves, and photons while what made them is
     /// the same.
     pub fn change(&mut self, scene: &Arc<Scene>, settings: RealtimeSettings) {
         let same_surfaces = Arc::ptr_eq(&scene.geometry, &self.scene.geometry) && scene.motions == self.scene.motions;
         let mesh_of = |s: &RealtimeSettings| (s.mesh_refinement, s.max_edge.to_bits());
         let keeps_mesh = same_surfaces && mesh_of(&settings) == mesh_of(&self.settings);
-        let keeps_photons = same_surfaces
-            && scene.materials == self.scene.materials
-            && photons_of(&settings) == photons_of(&self.settings);
+        let keeps_photons =
+            same_surfaces && same_materials(scene, &self.scene) && photons_of(&settings) == photons_of(&self.settings);
         if !(keeps_mesh && keeps_photons) {
             let mesh = keeps_mesh.then(|| Arc::clone(&self.mesh));
             let next = self.next;
@@ -138,6 +145,7 @@ impl Engine {
         let looks_alike = settings.cull_back_faces == self.settings.cull_back_faces;
         self.scene = Arc::clone(scene);
         self.settings = settings;
+        self.world.set_lights(scene);
         if !looks_alike {
             self.view.forget();
         }
@@ -394,6 +402,10 @@ impl Engine {
     pub fn settings(&self) -> &RealtimeSettings {
         &self.settings
     }
+}
+
+fn same_materials(a: &Scene, b: &Scene) -> bool {
+    a.materials.len() == b.materials.len() && a.materials.iter().zip(&b.materials).all(|(a, b)| a.is_same(b))
 }
 
 /// The refined mesh that the settings ask for.

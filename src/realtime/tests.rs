@@ -128,6 +128,24 @@ fn a_map_is_renewed_after_exactly_its_frames() {
     }
 }
 
+/// A light that is moved by an edit shines from its new place in the next frame; a camera that is moved changes nothing.
+#[test]
+fn edits_reach_the_engine() {
+    let mut e = engine("cornell", &["mesh_refinement=200", "photons_from_light=50"]);
+    run(&mut e, 3, 0.0);
+    let mut edited = (**e.scene()).clone();
+    edited.camera.position.x += 0.1;
+    assert!(e.shows(&edited));
+    edited.lights = vec![Light::Point { position: Vec3::new(0.5, -0.5, 0.5), power: edited.lights[0].flux() }];
+    assert!(!e.shows(&edited));
+    let mesh = Arc::clone(e.mesh());
+    let (before, settings) = (e.map().frames(), e.settings().clone());
+    e.change(&Arc::new(edited), settings);
+    assert!(Arc::ptr_eq(&mesh, e.mesh()) && e.map().frames() == before);
+    run(&mut e, 1, 0.0);
+    assert!(matches!(e.lights()[0], Light::Point { .. }) && e.map().frames().len() == 4);
+}
+
 /// Threads change nothing.
 #[test]
 fn any_number_of_threads_makes_the_same_bits() {

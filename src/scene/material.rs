@@ -75,6 +75,17 @@ impl Material {
 }
 
 impl Material {
+    /// Whether it is the same material with the same texture in memory; textures are not looked into.
+    pub fn is_same(&self, other: &Self) -> bool {
+        match (self, other) {
+            (
+                Self::Diffuse { reflectance: a, texture: Some(s) },
+                Self::Diffuse { reflectance: b, texture: Some(t) },
+            ) => a == b && Arc::ptr_eq(s, t),
+            _ => self == other,
+        }
+    }
+
     /// Diffuse reflectance with the mean of its texture; black for other kinds.
     pub fn average_reflectance(&self) -> Rgb {
         match self {

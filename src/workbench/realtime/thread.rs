@@ -185,7 +185,8 @@ fn make(work: &mut Option<Work>, wish: Wish) -> LiveFrame {
     let restarted = work.as_ref().is_some_and(|w| w.granted.restarts != wish.restarts);
     let mut now = match work.take() {
         Some(mut w) if !restarted => {
-            let same = Arc::ptr_eq(&w.granted.scene, &wish.scene) && w.granted.settings == wish.settings;
+            // A walk changes the camera alone, and nothing that was estimated.
+            let same = w.engine.shows(&wish.scene) && w.granted.settings == wish.settings;
             if !same {
                 w.engine.change(&wish.scene, wish.settings.clone());
             }
