@@ -117,7 +117,8 @@ pub fn run(args: &ShotArgs) -> Result<(), Failure> {
         print(&to_json(&report)?)?;
     } else if !args.flags.quiet {
         let [w, h] = args.window;
-        print(&format!("{}: {} after {} passes, {w}x{h}\n", report.file, report.provenance.scene, args.passes))?;
+        let after = args.realtime.map_or(format!("{} passes", args.passes), |n| format!("{n} frames"));
+        print(&format!("{}: {} after {after}, {w}x{h}\n", report.file, report.provenance.scene))?;
     }
     Ok(())
 }
@@ -131,8 +132,7 @@ fn prepare(args: &ShotArgs, workbench: &mut Workbench) -> Result<(), Failure> {
         }
         workbench.run(Action::Pin(pixel));
     }
-    // The first frame is made without being asked for.
-    workbench.live().step(args.realtime.map_or(0, |n| n.saturating_sub(1)));
+    workbench.live().step(args.realtime.unwrap_or(0));
     workbench.show_gathering(args.ray.map(|n| n as usize - 1), args.layer);
     if let Some(panel) = args.maximize {
         workbench.run(Action::Maximize(panel - 1));

@@ -170,6 +170,24 @@ fn sessions_keep_the_view_and_its_parameters() {
     assert!(!plain.contains("realtime") && !plain.contains("rendering"), "{plain}");
 }
 
+/// As many frames as are asked for before the first is drawn.
+#[test]
+fn a_shot_has_as_many_frames_as_asked_for() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("view.png");
+    let run = std::process::Command::new(env!("CARGO_BIN_EXE_cusp"))
+        .args(["shot", "rooms", "--realtime", "3", "--window", "400x300", "-o"])
+        .arg(&file)
+        .output()
+        .expect("the binary runs");
+    assert!(run.status.success() && String::from_utf8_lossy(&run.stdout).contains("rooms after 3 frames"));
+    let opened = cusp::workbench::document::Opened::new(live("rooms")).expect("opens");
+    let mut shot = cusp::workbench::shot::Shot::new(opened, None, [400, 300], 1.0).expect("threads");
+    shot.workbench().live().step(3);
+    shot.take(|_| false).expect("a picture");
+    assert_eq!(shot.workbench().live().last().expect("a frame").report.frame, 2);
+}
+
 /// The flashlight with its cone, and photons by age.
 #[test]
 fn the_view_with_flashlight_and_photons() {
