@@ -104,6 +104,8 @@ pub struct Engine {
     map_version: u64,
     report: FrameReport,
     wanted: Vec<u32>,
+    /// Whether each face of each triangle has been met in this picture; kept from frame to frame.
+    seen: Vec<bool>,
 }
 
 impl Engine {
@@ -180,6 +182,7 @@ impl Engine {
             map_version: 0,
             report: FrameReport::default(),
             wanted: Vec::new(),
+            seen: Vec::new(),
             settings,
         };
         engine.clear_irradiance();
@@ -270,7 +273,9 @@ impl Engine {
     /// visible. A slot that is wanted is marked at once, so that it is wanted once.
     fn collect_wanted(&mut self) -> u64 {
         self.wanted.clear();
-        let mut seen = vec![false; 2 * self.mesh.triangles.len()];
+        let mut seen = std::mem::take(&mut self.seen);
+        seen.clear();
+        seen.resize(2 * self.mesh.triangles.len(), false);
         let mut count = 0;
         for s in self.view.samples().iter().filter(|s| s.triangle != NONE) {
             let face = 2 * s.triangle as usize + usize::from(s.back);
@@ -282,6 +287,7 @@ impl Engine {
                 self.wanted.push(slot);
             }
         }
+        self.seen = seen;
         self.wanted.retain(|&slot| self.irradiance[slot as usize].1 != self.map_version);
         self.wanted.sort_unstable();
         self.wanted.dedup();

@@ -15,7 +15,7 @@ use super::render::Render;
 use super::watch::{self, Watch};
 use super::worker::Wake;
 use super::{bars, dialogs, theme};
-use crate::export::session::{Panel, Rendering, Session};
+use crate::export::session::{Panel, Session};
 use crate::measure::Reference;
 use egui_tiles::Tree;
 use std::path::PathBuf;
@@ -31,11 +31,11 @@ pub struct Workbench {
     pub(super) analysis: Analysis<Kind, Finding>,
     pub(super) tree: Tree<Pane>,
     /// The real-time view.
-    live: LiveView,
+    pub(super) live: LiveView,
     /// Whether the real-time view was shown in the last frame, and whether the progressive render was paused before.
-    was_live: Option<bool>,
+    pub(super) was_live: Option<bool>,
     /// Whether the progressive render is that of an older session.
-    stale: bool,
+    pub(super) stale: bool,
     context: egui::Context,
     watch: Watch,
     /// Passes and drafts whose images have been measured.
@@ -143,38 +143,6 @@ impl Workbench {
         if self.desk.unfinished {
             ui.ctx().request_repaint();
         }
-    }
-
-    /// Whether the real-time view is shown.
-    pub fn is_live(&self) -> bool {
-        self.document.session.rendering == Rendering::Realtime
-    }
-
-    /// The progressive render rests while the real-time view is shown, and goes on from the same camera and scene.
-    fn enter_or_leave(&mut self, live: bool) {
-        match (live, self.was_live) {
-            (true, None) => {
-                let paused = self.render.is_paused();
-                self.render.gate().into_iter().for_each(super::worker::gate::Gate::pause);
-                self.was_live = Some(paused);
-            }
-            (false, Some(paused)) => {
-                self.live.leave();
-                self.was_live = None;
-                if std::mem::take(&mut self.stale) {
-                    self.restart();
-                }
-                if !paused {
-                    self.render.gate().into_iter().for_each(super::worker::gate::Gate::resume);
-                }
-            }
-            _ => {}
-        }
-    }
-
-    /// The real-time view, to be told what to show.
-    pub fn live(&mut self) -> &mut LiveView {
-        &mut self.live
     }
 
     /// Takes in what the threads tell.
@@ -299,15 +267,10 @@ impl Workbench {
     }
 
     /// Sends a new job for the document as it is.
-    fn restart(&mut self) {
+    pub(super) fn restart(&mut self) {
         self.desk.forget_errors();
         let job = self.document.job(self.render.next_generation());
         self.render.start(job, &mut self.gallery, &mut self.messages);
-    }
-
-    /// As [`Self::restart`], but only notes that it must be while the real-time view is shown.
-    fn restart_or_note(&mut self) {
-        if self.is_live() { self.stale = true } else { self.restart() }
     }
 
     /// Does what a change of the session asks for.

@@ -3,6 +3,7 @@
 mod parameters;
 mod picture;
 mod statistics;
+mod switch;
 pub mod thread;
 
 use super::desk::Desk;
