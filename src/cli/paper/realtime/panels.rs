@@ -153,7 +153,8 @@ pub(super) fn draw(title: &str, shown: &[Shown], against: Option<&Against>, orig
                 color: PALETTE[i % PALETTE.len()],
                 image: s.image.clone(),
                 look: look(),
-                error: against.map(|a| signed_error(&s.image, &a.image)),
+                // What the reference does not show has no error against it.
+                error: against.filter(|_| s.relative_rmse.is_some()).map(|a| signed_error(&s.image, &a.image)),
             }
         })
         .collect();

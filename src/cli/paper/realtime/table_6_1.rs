@@ -234,7 +234,8 @@ fn plot(grids: &[Grid], origin: &Origin) -> Plot {
             .map(|k| {
                 let at = |i: usize| if by_photons { g.frames_per_second[k][i] } else { g.frames_per_second[i][k] };
                 Series {
-                    name: format!("{} {}", GRID[k], if by_photons { "triangles" } else { "photons" }),
+                    // One legend serves all: rows have so many triangles, columns so many photons.
+                    name: format!("{} triangles, along columns photons", GRID[k]),
                     color: ink(k),
                     line: (0..7).map(|i| (f64::from(GRID[i]), 1.0 / at(i))).collect(),
                     marks: true,
