@@ -229,7 +229,7 @@ proptest! {
             (0..photons.len() as u32).filter(|i| map.photons()[*i as usize].lights(query.normal)).collect();
         let mut heap = crate::photons::kd_tree::Nearest::new();
         map.nearest_anywhere(&query, k, &mut heap);
-        let mut found: Vec<u32> = heap.iter().map(|(_, i)| *i).collect();
+        let mut found: Vec<u32> = heap.iter().map(|(_, i)| i).collect();
         let mut nearest = lit.clone();
         let distance = |i: u32| map.photons()[i as usize].position.length_squared();
         nearest.sort_by(|i, j| distance(*i).total_cmp(&distance(*j)).then(i.cmp(j)));

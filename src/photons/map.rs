@@ -194,7 +194,7 @@ impl PhotonMap {
         let view_radius = (a + b).length().max((a - b).length());
         // A photon farther than its reach from the view plane has no weight on it: the slice is exact.
         self.nearest_in(query, k, view_radius + self.longest_reach, self.longest_reach, heap);
-        out.extend(heap.iter().map(|(_, i)| *i));
+        out.extend(heap.iter().map(|(_, i)| i));
     }
 
     /// Leaves in `heap` the `k` photons nearest to the query's centre, however far, for density estimation.

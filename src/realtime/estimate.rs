@@ -154,16 +154,16 @@ pub fn search_radius(scene: &Scene, map: &PhotonMap, s: &RealtimeSettings) -> f3
 fn estimate(query: &Query, photons: &[Photon], kind: Area, least: f32, scale: f64, scratch: &mut Scratch) -> Estimate {
     let found = &scratch.found;
     let full = found.len() == query.count;
-    let farthest = found.peek().map_or(0.0, |f| f32::from_bits(f.0).sqrt());
+    let farthest = found.farthest().map_or(0.0, |f| f32::from_bits(f.0).sqrt());
     let radius = if full { farthest } else { query.radius }.max(least);
-    let sum: DVec3 = found.iter().map(|&(_, i)| photons[i as usize].power.as_dvec3()).sum();
+    let sum: DVec3 = found.iter().map(|(_, i)| photons[i as usize].power.as_dvec3()).sum();
     let disc = PI * f64::from(radius).powi(2);
     let shape = if kind == Area::Disc {
         None
     } else {
         scratch.offsets.clear();
         let here = query.position.as_dvec3();
-        scratch.offsets.extend(found.iter().map(|&(_, i)| photons[i as usize].position.as_dvec3() - here));
+        scratch.offsets.extend(found.iter().map(|(_, i)| photons[i as usize].position.as_dvec3() - here));
         let (x, y) = tangents(query.normal);
         let frame = [x.as_dvec3(), y.as_dvec3()];
         area::area(kind, &scratch.offsets, frame, query.normal.as_dvec3(), &mut scratch.in_plane)

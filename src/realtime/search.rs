@@ -15,13 +15,14 @@ pub struct Cylinder {
 }
 
 impl Volume for Cylinder {
-    #[inline]
+    #[inline(always)]
     fn squared(&self, offset: Vec3) -> f32 {
         let along = offset.dot(self.normal);
-        if along.abs() > self.height { f32::INFINITY } else { (offset - self.normal * along).length_squared() }
+        let squared = (offset - self.normal * along).length_squared();
+        if along.abs() > self.height { f32::INFINITY } else { squared }
     }
 
-    #[inline]
+    #[inline(always)]
     fn reach(&self, squared: f32) -> f32 {
         // Rounding of the difference above must not lose what lies on the rim.
         (squared + self.height * self.height) * (1.0 + 8.0 * f32::EPSILON)
@@ -38,14 +39,14 @@ pub struct Ellipsoid {
 }
 
 impl Volume for Ellipsoid {
-    #[inline]
+    #[inline(always)]
     fn squared(&self, offset: Vec3) -> f32 {
         let along = offset.dot(self.normal);
         let stretched = along * self.per_height;
         (offset - self.normal * along).length_squared() + stretched * stretched
     }
 
-    #[inline]
+    #[inline(always)]
     fn reach(&self, squared: f32) -> f32 {
         squared * (1.0 + 8.0 * f32::EPSILON)
     }
@@ -129,6 +130,6 @@ impl Query {
             .collect();
         all.sort_unstable();
         all.truncate(self.count);
-        all.into()
+        all.into_iter().collect()
     }
 }

@@ -74,7 +74,7 @@ fn the_map_is_the_exact_map() {
             let radius = [0.3, 1.0, 40.0][(i / 7) as usize % 3];
             let query = Query::new(&s, near.position + Vec3::new(x[1], x[2], x[3]) * 0.1, near.normal, radius);
             map.nearest(&query, &mut found);
-            let mut got: Vec<(u32, u32)> = found.iter().copied().collect();
+            let mut got: Vec<(u32, u32)> = found.iter().collect();
             got.sort_unstable();
             let mut exact = if partition == Partition::Normal {
                 // Those of the same class, tried one by one, by their places in the whole list.
@@ -83,9 +83,9 @@ fn the_map_is_the_exact_map() {
                     .filter(|(_, p)| normal_class(p.normal) == normal_class(query.normal))
                     .collect();
                 let own: Vec<_> = class.iter().map(|(_, p)| **p).collect();
-                query.exact(&own).into_iter().map(|(d, i)| (d, class[i as usize].0)).collect::<Vec<_>>()
+                query.exact(&own).iter().map(|(d, i)| (d, class[i as usize].0)).collect::<Vec<_>>()
             } else {
-                query.exact(&photons).into_vec()
+                query.exact(&photons).iter().collect::<Vec<_>>()
             };
             exact.sort_unstable();
             assert_eq!(got, exact, "{query:?}");

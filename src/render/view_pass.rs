@@ -178,7 +178,8 @@ pub(super) struct Scratch {
     indices: Vec<u32>,
     /// For each hit and map: where its indices start and end, and the radius of its disc.
     spans: Vec<(usize, usize, f32)>,
-    heap: Nearest,
+    /// The nearest photons of each map, which the search for the next hit starts from.
+    nearest: [Nearest; PhotonKind::ALL.len()],
     gather: GatherScratch,
 }
 
@@ -353,7 +354,7 @@ impl ViewPass<'_> {
             scratch.indices.clear();
             scratch.spans.clear();
             while next < scratch.hits.len() && scratch.indices.len() < BATCH {
-                for (_, map) in self.maps.of_estimator(slot.estimator) {
+                for map in self.maps.of_estimator(slot.estimator) {
                     let from = scratch.indices.len();
                     let radius = self.gather(map, slot, next, scratch);
                     disc_floor += u64::from(radius > 0.0 && radius <= resolution);
@@ -423,7 +424,7 @@ impl ViewPass<'_> {
         let view_trace = start.elapsed().as_secs_f64();
         let start = Instant::now();
         for hit in 0..scratch.hits.len() {
-            for (_, map) in self.maps.of_estimator(slot.estimator) {
+            for map in self.maps.of_estimator(slot.estimator) {
                 let from = scratch.indices.len();
                 let radius = self.gather(map, slot, hit, &mut scratch);
                 scratch.spans.push((from, scratch.indices.len(), radius));
@@ -444,7 +445,7 @@ impl ViewPass<'_> {
         for hit in 0..scratch.hits.len() {
             for (kind, map) in self.maps.of_estimator(slot.estimator) {
                 scratch.indices.clear();
-                let radius = self.gather(map, slot, hit, scratch);
+                let radius = self.gather((kind, map), slot, hit, scratch);
                 let gathered = Gathered { photons: map.photons(), indices: &scratch.indices, radius };
                 let seen = ViewHit { view: scratch.hits[hit].seen_by(slot.estimator), ..scratch.hits[hit] };
                 visit(hit, &seen, kind, &gathered);
@@ -453,23 +454,23 @@ impl ViewPass<'_> {
     }
 
     /// Appends the photons of one hit to the scratch's indices; returns the radius of the disc, if it asks for one.
-    fn gather(&self, map: &PhotonMap, slot: &Slot, hit: usize, scratch: &mut Scratch) -> f32 {
+    fn gather(&self, (kind, map): (PhotonKind, &PhotonMap), slot: &Slot, hit: usize, scratch: &mut Scratch) -> f32 {
         let mut own = scratch.hits[hit].view;
         let query = scratch.hits[hit].seen(slot.estimator, &mut own).query;
-        let (indices, heap) = (&mut scratch.indices, &mut scratch.heap);
+        let (indices, nearest) = (&mut scratch.indices, &mut scratch.nearest[kind as usize]);
         let k = self.tracer.settings.k;
         match (slot.estimator.lookup(), slot.gather) {
             (Lookup::Disc, _) => {
-                map.nearest_anywhere(&query, k, heap);
-                let Some(&(bits, _)) = heap.peek() else { return 0.0 };
-                indices.extend(heap.iter().map(|(_, i)| *i));
+                map.nearest_anywhere(&query, k, nearest);
+                let Some((bits, _)) = nearest.farthest() else { return 0.0 };
+                indices.extend(nearest.iter().map(|(_, i)| i));
                 let radius = (f32::from_bits(bits) * self.area_factor).sqrt();
                 return radius.max(self.tracer.scene.resolution());
             }
             (Lookup::Point, Gather::Overlap) => map.overlapping_point(&query, indices),
             (Lookup::Parallelogram, Gather::Overlap) => map.overlapping_parallelogram(&query, indices),
-            (Lookup::Point, Gather::Knn) => map.nearest(&at_point(&query), k, heap, indices),
-            (Lookup::Parallelogram, Gather::Knn) => map.nearest(&query, k, heap, indices),
+            (Lookup::Point, Gather::Knn) => map.nearest(&at_point(&query), k, nearest, indices),
+            (Lookup::Parallelogram, Gather::Knn) => map.nearest(&query, k, nearest, indices),
         }
         0.0
     }

@@ -1,13 +1,13 @@
 //! Closest hit and any hit on `obvhs`, with leaf tests of our own.
 
 use crate::scene::Geometry;
+use crate::trace::traversal::{BoxRay, LeafTest, traverse};
 use crate::trace::triangle::ShearedRay;
 use glam::{Vec3, Vec3A};
 use obvhs::BvhBuildParams;
 use obvhs::aabb::Aabb;
 use obvhs::cwbvh::CwBvh;
 use obvhs::cwbvh::builder::build_cwbvh;
-use obvhs::ray::RayHit;
 use std::time::Duration;
 
 /// A ray in local coordinates.
@@ -38,14 +38,16 @@ pub struct Intersector {
     /// Corners of each leaf entry, in the order in which rays meet them; for a sphere centre and radius.
     leaves: Vec<[Vec3; 3]>,
     triangle_count: u32,
+    /// Whether there is anything but triangles: what is met is looked up for nothing where there is not.
+    has_spheres: bool,
     /// Power of two by which coordinates are multiplied inside; see [`SCALED_RADIUS`].
     scale: f32,
 }
 
 /// Radius to which a scene is scaled inside the intersector, up to a factor of two.
 ///
-/// `obvhs` skips boxes that a ray leaves within 10⁻⁴ units of its start. In a scene of this size that is less than
-/// rounding, whatever unit the scene is in; and a power of two scales without rounding.
+/// Whatever unit a scene is in, its boxes are tested by the same numbers, far from the ends of f32; and a power of two scales
+/// without rounding.
 const SCALED_RADIUS: f32 = (1u32 << SCALED_EXPONENT) as f32;
 const SCALED_EXPONENT: i32 = 20;
 
@@ -93,7 +95,7 @@ impl Intersector {
                 }
             })
             .collect();
-        Self { bvh, primitives, leaves, triangle_count, scale }
+        Self { bvh, primitives, leaves, triangle_count, has_spheres: !geometry.spheres.is_empty(), scale }
     }
 
     /// The nearest surface along `ray`; of surfaces at the same distance the one of lower index. None for a ray that is
@@ -101,17 +103,11 @@ impl Intersector {
     pub fn closest(&self, ray: &Ray) -> Option<Hit> {
         let ray = &Ray { origin: ray.origin * self.scale, ..*ray };
         let start = self.start(ray, f32::INFINITY)?;
+        let best = Hit { t: f32::INFINITY, primitive: u32::MAX, weights: [0.0; 2] };
         let sheared = ShearedRay::new(ray.origin, ray.direction);
-        let mut best = Hit { t: f32::INFINITY, primitive: u32::MAX, weights: [0.0; 2] };
-        self.bvh.ray_traverse(start.traversal, &mut RayHit::none(), |_, leaf| {
-            match self.leaf(ray, &sheared, leaf, best.t) {
-                Some((t, b, c)) if t < best.t || self.primitives[leaf] < best.primitive => {
-                    best = Hit { t, primitive: self.primitives[leaf], weights: [b, c] };
-                    start.before(t)
-                }
-                _ => f32::INFINITY,
-            }
-        });
+        let mut closest = Closest { on: self, ray, sheared, start: &start, best };
+        traverse(&self.bvh.nodes, &start.traversal, start.before(f32::INFINITY), &mut closest);
+        let best = closest.best;
         best.t.is_finite().then_some(Hit { t: best.t / self.scale, ..best })
     }
 
@@ -123,11 +119,9 @@ impl Intersector {
             return false;
         };
         let sheared = ShearedRay::new(ray.origin, ray.direction);
-        !self.bvh.ray_traverse_miss(start.traversal, |_, leaf| match self.leaf(ray, &sheared, leaf, t_max) {
-            // Below any limit that the traversal may have, to end it.
-            Some((t, ..)) if t < t_max => f32::NEG_INFINITY,
-            _ => f32::INFINITY,
-        })
+        let mut any = Any { on: self, ray, sheared, t_max, met: false };
+        traverse(&self.bvh.nodes, &start.traversal, start.before(t_max), &mut any);
+        any.met
     }
 
     #[inline(always)]
@@ -149,25 +143,16 @@ impl Intersector {
                 moved = along as f32;
             }
         }
-        // A zero below zero would turn the box test over.
+        // A zero has no sign.
         let direction = ray.direction + Vec3::ZERO;
         let inverse = direction.abs().max(Vec3::splat(SMALLEST_COMPONENT)).copysign(direction).recip();
-        let traversal = obvhs::ray::Ray {
-            origin: origin.into(),
-            direction: direction.into(),
-            inv_direction: inverse.into(),
-            tmin: 0.0,
-            tmax: t_max,
-        };
-        let mut start = Start { traversal, moved };
-        start.traversal.tmax = start.before(t_max);
-        Some(start)
+        Some(Start { traversal: BoxRay { origin, inverse }, moved })
     }
 
-    #[inline]
+    #[inline(always)]
     fn leaf(&self, ray: &Ray, sheared: &ShearedRay, leaf: usize, t_max: f32) -> Option<(f32, f32, f32)> {
         let shape = &self.leaves[leaf];
-        if self.primitives[leaf] < self.triangle_count {
+        if !self.has_spheres || self.primitives[leaf] < self.triangle_count {
             sheared.intersect(shape, t_max)
         } else {
             sphere(ray, shape[0], shape[1].x, t_max).map(|t| (t, 0.0, 0.0))
@@ -177,7 +162,7 @@ impl Intersector {
 
 /// A ray made ready for the box test.
 struct Start {
-    traversal: obvhs::ray::Ray,
+    traversal: BoxRay,
     /// By how much its start was moved along it.
     moved: f32,
 }
@@ -188,6 +173,47 @@ impl Start {
     fn before(&self, t: f32) -> f32 {
         // A part more than rounding may take from a long way.
         if self.moved > 0.0 { t * (1.0 + 4.0 * f32::EPSILON) - self.moved } else { t }
+    }
+}
+
+/// The nearest of the surfaces that are met.
+struct Closest<'a> {
+    on: &'a Intersector,
+    ray: &'a Ray,
+    sheared: ShearedRay,
+    start: &'a Start,
+    best: Hit,
+}
+
+impl LeafTest for Closest<'_> {
+    #[inline(always)]
+    fn test(&mut self, leaf: usize, limit: &mut f32) -> bool {
+        if let Some((t, b, c)) = self.on.leaf(self.ray, &self.sheared, leaf, self.best.t) {
+            let primitive = self.on.primitives[leaf];
+            if t < self.best.t || primitive < self.best.primitive {
+                self.best = Hit { t, primitive, weights: [b, c] };
+                *limit = self.start.before(t);
+            }
+        }
+        false
+    }
+}
+
+/// Whether any surface is met before a distance.
+struct Any<'a> {
+    on: &'a Intersector,
+    ray: &'a Ray,
+    sheared: ShearedRay,
+    t_max: f32,
+    met: bool,
+}
+
+impl LeafTest for Any<'_> {
+    #[inline(always)]
+    fn test(&mut self, leaf: usize, _: &mut f32) -> bool {
+        let hit = self.on.leaf(self.ray, &self.sheared, leaf, self.t_max);
+        self.met = hit.is_some_and(|(t, ..)| t < self.t_max);
+        self.met
     }
 }
 
@@ -209,8 +235,8 @@ pub fn sphere(ray: &Ray, center: Vec3, radius: f32, t_max: f32) -> Option<f32> {
     (t > 0.0 && t <= t_max).then_some(t)
 }
 
-/// Slow builders pay off while building is short against the rays to come.
-fn build_parameters(primitives: usize) -> BvhBuildParams {
+/// How the hierarchy over so many surfaces is built: slow builders pay off while building is short against the rays to come.
+pub fn build_parameters(primitives: usize) -> BvhBuildParams {
     match primitives {
         0..20_000 => BvhBuildParams::very_slow_build(),
         20_000..500_000 => BvhBuildParams::slow_build(),

@@ -5,6 +5,7 @@ pub mod direct;
 pub mod intersector;
 pub mod scatter;
 pub mod surface;
+pub mod traversal;
 pub mod triangle;
 pub mod view_ray;
 

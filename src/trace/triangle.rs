@@ -39,7 +39,7 @@ impl ShearedRay {
     /// Distance along the ray and the weights of the second and third corner, if the triangle is met from either
     /// side at a distance in `(0, t_max]`. An edge shared by two triangles is never missed by both; a triangle that
     /// the ray runs along, or that has no area, is not met.
-    #[inline]
+    #[inline(always)]
     pub fn intersect(&self, corners: &[Vec3; 3], t_max: f32) -> Option<(f32, f32, f32)> {
         let [sx, sy] = self.across;
         let [a, b, c] = [

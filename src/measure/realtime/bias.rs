@@ -379,7 +379,7 @@ impl Sum {
         let found = estimator.direct_gathering(probe.position, probe.normal, scratch);
         let (photons, radius) = (engine.map().photons(), engine.scene().radius);
         let (mut all, mut own) = (0.0, 0.0);
-        for &(_, i) in scratch.found() {
+        for (_, i) in scratch.found().iter() {
             let p = &photons[i as usize];
             let power = p.power.as_dvec3();
             let power = (power.x + power.y + power.z) / 3.0 * estimator.scale();

@@ -136,7 +136,7 @@ fn crowded_maps() -> Outcome {
                 let query = Query { center, normal: Vec3::Y, axes };
                 for k in [1usize, 50, 30_000] {
                     map.nearest_anywhere(&query, k, &mut heap);
-                    let mut found: Vec<u32> = heap.iter().map(|(_, i)| *i).collect();
+                    let mut found: Vec<u32> = heap.iter().map(|(_, i)| i).collect();
                     found.sort_unstable();
                     let mut all: Vec<(f32, u32)> = map
                         .photons()

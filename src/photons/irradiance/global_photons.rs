@@ -94,11 +94,11 @@ impl GlobalPhotons {
             }
             radius = (radius * 2.0).min(search.farthest);
         }
-        let disc = match heap.peek() {
-            Some(&(bits, _)) if heap.len() >= search.k => f32::from_bits(bits).sqrt(),
+        let disc = match heap.farthest() {
+            Some((bits, _)) if heap.len() >= search.k => f32::from_bits(bits).sqrt(),
             _ => radius,
         };
-        let sum: DVec3 = heap.iter().map(|&(_, i)| self.photons[i as usize].power.as_dvec3()).sum();
+        let sum: DVec3 = heap.iter().map(|(_, i)| self.photons[i as usize].power.as_dvec3()).sum();
         let disc = f64::from(disc.max(search.smallest));
         sum / (PI * disc * disc)
     }

@@ -1,0 +1,131 @@
+//! Closest hits and shadow rays on large meshes, beside those of `obvhs` on the same hierarchy.
+
+#![allow(clippy::expect_used, missing_docs, reason = "a failed expectation is how this program reports")]
+
+use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use cusp::math::frame::{cosine_hemisphere, uniform_sphere};
+use cusp::math::sequence::{Sampling, Sequence};
+use cusp::scene::Geometry;
+use cusp::scene::geometry::NONE;
+use cusp::trace::intersector::build_parameters;
+use cusp::trace::surface::flat_normal;
+use cusp::trace::{Intersector, Ray};
+use glam::Vec3;
+use obvhs::cwbvh::builder::build_cwbvh_from_tris;
+use obvhs::ray::RayHit;
+use obvhs::triangle::Triangle;
+use std::f32::consts::{PI, TAU};
+use std::time::Duration;
+
+/// Half the side of the box about the mesh, metres.
+const SIDE: f32 = 2.0;
+/// Radius of a ball that holds the box.
+const RADIUS: f32 = 3.5;
+
+/// A lumpy ball of some `4 rows²` triangles in a closed box.
+fn lumpy_ball(rows: u32) -> Geometry {
+    let mut g = Geometry::default();
+    let columns = 2 * rows;
+    for row in 0..=rows {
+        for column in 0..columns {
+            let (turn, down) = (TAU * column as f32 / columns as f32, PI * (0.01 + 0.98 * row as f32 / rows as f32));
+            let d = Vec3::new(down.sin() * turn.cos(), down.cos(), down.sin() * turn.sin());
+            let large = (9.0 * d.x).sin() * (8.0 * d.y).sin() * (10.0 * d.z).cos();
+            let small = (41.0 * d.x).sin() * (37.0 * d.z).sin() + (53.0 * d.y).cos() * (43.0 * d.x).sin();
+            g.positions.push(d * (1.0 + 0.15 * large + 0.03 * small));
+        }
+    }
+    for row in 0..rows {
+        for column in 0..columns {
+            let at = |r: u32, c: u32| r * columns + c % columns;
+            let [a, b, c, d] = [at(row, column), at(row, column + 1), at(row + 1, column + 1), at(row + 1, column)];
+            g.triangles.extend([[a, b, c], [a, c, d]]);
+        }
+    }
+    let corner = g.positions.len() as u32;
+    g.positions
+        .extend((0..8u32).map(|i| Vec3::from([0, 1, 2].map(|axis| if i >> axis & 1 == 0 { -SIDE } else { SIDE }))));
+    for [a, b, c, d] in [[0, 1, 3, 2], [4, 5, 7, 6], [0, 1, 5, 4], [2, 3, 7, 6], [0, 2, 6, 4], [1, 3, 7, 5]] {
+        g.triangles.extend([[a, b, c], [a, c, d]].map(|t| t.map(|i: u32| corner + i)));
+    }
+    let count = g.triangles.len();
+    g.corner_normals = vec![[NONE; 3]; count];
+    g.corner_uvs = vec![[NONE; 3]; count];
+    g.triangle_materials = vec![0; count];
+    g
+}
+
+/// The second to fifth ray of diffuse paths that start in the box.
+fn bounces(g: &Geometry, intersector: &Intersector, count: usize) -> Vec<Ray> {
+    let sequence = Sequence::new(Sampling::Random, 3);
+    let mut rays = Vec::with_capacity(count);
+    let mut path = 0;
+    while rays.len() < count {
+        let (x, y) = (sequence.four(path, 0), sequence.four(path, 1));
+        let mut ray = Ray {
+            origin: uniform_sphere(x[0], x[1]) * (1.9 * x[2]),
+            direction: uniform_sphere(y[0], y[1]).normalize(),
+        };
+        for bounce in 0..5 {
+            if bounce > 0 {
+                rays.push(ray);
+            }
+            let Some(hit) = intersector.closest(&ray) else { break };
+            let normal = flat_normal(g.corners(hit.primitive as usize)).as_vec3();
+            let normal = if normal.dot(ray.direction) > 0.0 { -normal } else { normal };
+            let z = sequence.four(path, 2 + bounce);
+            let origin = ray.origin + ray.direction * hit.t + normal * 1e-4;
+            ray = Ray { origin, direction: cosine_hemisphere(normal, z[0], z[1]) };
+        }
+        path += 1;
+    }
+    rays.truncate(count);
+    rays
+}
+
+const RAYS: usize = 100_000;
+
+fn rays(c: &mut Criterion) {
+    for rows in [50, 500] {
+        let g = lumpy_ball(rows);
+        let count = g.triangles.len();
+        let intersector = Intersector::new(&g, RADIUS);
+        let rays = bounces(&g, &intersector, RAYS);
+        let corner = |t: usize| g.corners(t).map(Into::into);
+        let triangles: Vec<Triangle> = (0..count).map(corner).map(|[v0, v1, v2]| Triangle { v0, v1, v2 }).collect();
+        let bvh = build_cwbvh_from_tris(&triangles, build_parameters(count), &mut Duration::default());
+        let leaves: Vec<Triangle> = bvh.primitive_indices.iter().map(|&i| triangles[i as usize]).collect();
+        let prepared = |r: &Ray| obvhs::ray::Ray::new_inf(r.origin.into(), r.direction.into());
+
+        let mut group = c.benchmark_group(format!("bounce_rays_on_{count}_triangles"));
+        group.throughput(Throughput::Elements(RAYS as u64)).sample_size(20);
+        group.bench_function(BenchmarkId::new("closest", "CwBvh::ray_traverse (baseline)"), |b| {
+            b.iter(|| {
+                let met = |r: &&Ray| {
+                    let mut hit = RayHit::none();
+                    bvh.ray_traverse(prepared(r), &mut hit, |ray, leaf| leaves[leaf].intersect(ray))
+                };
+                rays.iter().filter(met).count()
+            });
+        });
+        group.bench_function(BenchmarkId::new("closest", "Intersector"), |b| {
+            b.iter(|| rays.iter().filter(|r| intersector.closest(r).is_some()).count());
+        });
+        group.bench_function(BenchmarkId::new("any_within_1_m", "CwBvh::ray_traverse_miss (baseline)"), |b| {
+            b.iter(|| {
+                let missed = |r: &&Ray| {
+                    let ray = obvhs::ray::Ray { tmax: 1.0, ..prepared(r) };
+                    bvh.ray_traverse_miss(ray, |ray, leaf| leaves[leaf].intersect(ray))
+                };
+                rays.iter().filter(missed).count()
+            });
+        });
+        group.bench_function(BenchmarkId::new("any_within_1_m", "Intersector"), |b| {
+            b.iter(|| rays.iter().filter(|r| !intersector.any(r, 1.0)).count());
+        });
+        group.finish();
+    }
+}
+
+criterion_group!(benches, rays);
+criterion_main!(benches);

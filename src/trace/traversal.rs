@@ -1,0 +1,144 @@
+//! The way of a ray through a compressed wide hierarchy (Ylitie, Karras and Laine 2017), which `obvhs` builds.
+//!
+//! The eight boxes of a node are tested at once by arithmetic on lanes, in the widest instructions that the processor has
+//! (the crate `pulp` chooses them when the program runs). They round as the others do: what is met does not depend on them.
+
+use glam::Vec3;
+use obvhs::cwbvh::node::CwBvhNode;
+use pulp::{Arch, Simd, WithSimd};
+
+/// A ray made ready for the box test.
+#[derive(Clone, Copy, Debug)]
+pub struct BoxRay {
+    /// Start.
+    pub origin: Vec3,
+    /// One over each component of the direction, finite; its sign is the component's.
+    pub inverse: Vec3,
+}
+
+/// What is done with the primitives of a leaf.
+pub trait LeafTest {
+    /// Tests the entry `leaf` of the hierarchy's primitives; `limit` is how far boxes are opened, which it may lower. Returns
+    /// whether to end.
+    fn test(&mut self, leaf: usize, limit: &mut f32) -> bool;
+}
+
+/// Hands `test` all primitives of the leaves whose boxes the ray meets within `limit` of its start, those of near boxes first
+/// as far as the direction tells.
+#[inline]
+pub fn traverse(nodes: &[CwBvhNode], ray: &BoxRay, limit: f32, test: &mut impl LeafTest) {
+    if !nodes.is_empty() {
+        Arch::new().dispatch(Traversal { nodes, ray, limit, test });
+    }
+}
+
+struct Traversal<'a, T> {
+    nodes: &'a [CwBvhNode],
+    ray: &'a BoxRay,
+    limit: f32,
+    test: &'a mut T,
+}
+
+/// Children of a node that are still to be visited: index of the first, and a mask. Its upper 8 bits are the children that
+/// the ray meets, the nearest on top; its lower 8 bits those that are nodes.
+type Group = (u32, u32);
+
+const CHILDREN: u32 = 0xff00_0000;
+const PRIMITIVES: u32 = 0x00ff_ffff;
+
+/// Groups kept without allocation; a hierarchy over millions of triangles needs a dozen.
+const SHALLOW: usize = 64;
+
+impl<T: LeafTest> WithSimd for Traversal<'_, T> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<I: Simd>(self, _: I) {
+        let Self { nodes, ray, mut limit, test } = self;
+        let octant = ray.inverse.to_array().map(|c| u32::from(c >= 0.0));
+        let octant = octant[0] << 2 | octant[1] << 1 | octant[2];
+        let mut stack = [(0u32, 0u32); SHALLOW];
+        let mut deeper: Vec<Group> = Vec::new();
+        let mut top = 0;
+        let mut group: Group = (0, 1 << 31);
+        loop {
+            let child = 31 - group.1.leading_zeros();
+            let inner = group.1 & 0xff;
+            group.1 &= !(1 << child);
+            let slot = (child - 24) ^ octant;
+            let before = (inner & !(u32::MAX << slot)).count_ones();
+            let node = &nodes[(group.0 + before) as usize];
+            if group.1 & CHILDREN != 0 {
+                match stack.get_mut(top) {
+                    Some(place) => *place = group,
+                    None => deeper.push(group),
+                }
+                top += 1;
+            }
+            let met = boxes_met(node, ray, octant, limit);
+            group = (node.child_base_idx, met & CHILDREN | u32::from(node.imask));
+            let mut primitives = met & PRIMITIVES;
+            while primitives != 0 {
+                let leaf = node.primitive_base_idx + primitives.trailing_zeros();
+                primitives &= primitives - 1;
+                if test.test(leaf as usize, &mut limit) {
+                    return;
+                }
+            }
+            if group.1 & CHILDREN == 0 {
+                if top == 0 {
+                    return;
+                }
+                top -= 1;
+                group = match stack.get(top) {
+                    Some(place) => *place,
+                    None => deeper.pop().unwrap_or_default(),
+                };
+            }
+        }
+    }
+}
+
+/// The children of a node whose boxes the ray meets: nodes in the upper 8 bits, in the order of the octant, and the
+/// primitives of leaves in the lower 24.
+#[inline(always)]
+fn boxes_met(node: &CwBvhNode, ray: &BoxRay, octant: u32, limit: f32) -> u32 {
+    let extent = Vec3::from_array(node.e.map(|e| f32::from_bits(u32::from(e) << 23)));
+    let scale = extent * ray.inverse;
+    let start = (node.p - ray.origin) * ray.inverse;
+    let along = |axis: usize, low, high| if ray.inverse[axis] < 0.0 { (high, low) } else { (low, high) };
+    let (near_x, far_x): (&[u8; 8], &[u8; 8]) = along(0, &node.child_min_x, &node.child_max_x);
+    let (near_y, far_y): (&[u8; 8], &[u8; 8]) = along(1, &node.child_min_y, &node.child_max_y);
+    let (near_z, far_z): (&[u8; 8], &[u8; 8]) = along(2, &node.child_min_z, &node.child_max_z);
+    let x = |q: u8| f32::from(q) * scale.x + start.x;
+    let y = |q: u8| f32::from(q) * scale.y + start.y;
+    let z = |q: u8| f32::from(q) * scale.z + start.z;
+    let mut enters = [0.0f32; 8];
+    let mut leaves = [0.0f32; 8];
+    for i in 0..8 {
+        enters[i] = larger(larger(x(near_x[i]), y(near_y[i])), larger(z(near_z[i]), 0.0));
+    }
+    for i in 0..8 {
+        leaves[i] = smaller(smaller(x(far_x[i]), y(far_y[i])), smaller(z(far_z[i]), limit));
+    }
+    let mut bits = [0u32; 8];
+    for i in 0..8 {
+        let meta = u32::from(node.child_meta[i]);
+        // A node's bit is its slot, turned by the octant; a leaf's bits are its primitives.
+        let turn = if meta & 0x18 == 0x18 { octant } else { 0 };
+        let own = (meta >> 5) << ((meta ^ turn) & 31);
+        bits[i] = if enters[i] <= leaves[i] { own } else { 0 };
+    }
+    bits.iter().fold(0, |all, own| all | own)
+}
+
+/// Of two numbers, as the processor's own instruction has it.
+#[inline(always)]
+fn larger(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
+}
+
+#[inline(always)]
+fn smaller(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
+}
