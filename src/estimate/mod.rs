@@ -105,6 +105,7 @@ pub trait Estimator: Send + Sync {
 }
 
 /// Sum of the gathered photons' powers times `weight`.
+#[inline(always)]
 fn weighted_sum(gathered: &Gathered, weight: impl Fn(&MapPhoton) -> f64) -> DVec3 {
     let mut sum = DVec3::ZERO;
     for &i in gathered.indices {

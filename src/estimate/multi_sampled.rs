@@ -4,6 +4,7 @@ use super::{Construction, Estimator, Gathered, Lookup, SamplingPoint, View, weig
 use crate::estimate::settings::{Spec, SpecError};
 use crate::photons::MapPhoton;
 use glam::{DVec3, Vec3};
+use pulp::{Arch, Simd, WithSimd};
 
 /// Where the sampling points lie in `[-1, 1]`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -62,7 +63,7 @@ impl MultiSampled {
     }
 
     /// Mean of `(1 - u)²` over the points `c + s a + t b` of filter space.
-    #[inline]
+    #[inline(always)]
     pub fn mean(&self, c: Vec3, a: Vec3, b: Vec3) -> f64 {
         let (aa, bb, cc) = (a.length_squared(), b.length_squared(), c.length_squared());
         let reach = 1.0 + aa.sqrt() + bb.sqrt();
@@ -91,12 +92,28 @@ impl MultiSampled {
         sum / f64::from(self.n * self.n)
     }
 
-    #[inline]
+    #[inline(always)]
     fn over_area(&self, photon: &MapPhoton, view: &View) -> f64 {
         // The two footprint vectors enter filter space once for each photon, not once for each point.
         let c = photon.to_filter(view.query.center - photon.position);
         let [a, b] = view.query.axes.map(|v| photon.to_filter(v));
         3.0 * self.mean(c, a, b) * f64::from(photon.inverse_area)
+    }
+}
+
+/// The estimate as one function, compiled for each set of instructions; all round alike.
+struct Sum<'a> {
+    of: &'a MultiSampled,
+    gathered: &'a Gathered<'a>,
+    view: &'a View,
+}
+
+impl WithSimd for Sum<'_> {
+    type Output = DVec3;
+
+    #[inline(always)]
+    fn with_simd<I: Simd>(self, _: I) -> DVec3 {
+        weighted_sum(self.gathered, |p| self.of.over_area(p, self.view))
     }
 }
 
@@ -126,7 +143,7 @@ impl Estimator for MultiSampled {
     }
 
     fn irradiance(&self, gathered: &Gathered, view: &View) -> DVec3 {
-        weighted_sum(gathered, |p| self.over_area(p, view))
+        Arch::new().dispatch(Sum { of: self, gathered, view })
     }
 
     fn construction(&self, photon: &MapPhoton, view: &View) -> Construction {

@@ -103,12 +103,13 @@ impl Intersector {
     pub fn closest(&self, ray: &Ray) -> Option<Hit> {
         let ray = &Ray { origin: ray.origin * self.scale, ..*ray };
         let start = self.start(ray, f32::INFINITY)?;
-        let best = Hit { t: f32::INFINITY, primitive: u32::MAX, weights: [0.0; 2] };
         let sheared = ShearedRay::new(ray.origin, ray.direction);
-        let mut closest = Closest { on: self, ray, sheared, start: &start, best };
-        traverse(&self.bvh.nodes, &start.traversal, start.before(f32::INFINITY), &mut closest);
-        let best = closest.best;
-        best.t.is_finite().then_some(Hit { t: best.t / self.scale, ..best })
+        let mut closest =
+            Closest { on: self, ray, sheared, start: &start, t: f32::INFINITY, leaf: usize::MAX, weights: [0.0; 2] };
+        traverse(&self.bvh.nodes, &start.traversal, f32::INFINITY, &mut closest);
+        let Closest { t, leaf, weights, .. } = closest;
+        let primitive = *self.primitives.get(leaf)?;
+        t.is_finite().then_some(Hit { t: t / self.scale, primitive, weights })
     }
 
     /// Whether anything lies along `ray` before the distance `t_max`, metres.
@@ -182,16 +183,19 @@ struct Closest<'a> {
     ray: &'a Ray,
     sheared: ShearedRay,
     start: &'a Start,
-    best: Hit,
+    t: f32,
+    /// Its entry: what it stands for is looked up when it is known, not for each that is met on the way.
+    leaf: usize,
+    weights: [f32; 2],
 }
 
 impl LeafTest for Closest<'_> {
     #[inline(always)]
     fn test(&mut self, leaf: usize, limit: &mut f32) -> bool {
-        if let Some((t, b, c)) = self.on.leaf(self.ray, &self.sheared, leaf, self.best.t) {
-            let primitive = self.on.primitives[leaf];
-            if t < self.best.t || primitive < self.best.primitive {
-                self.best = Hit { t, primitive, weights: [b, c] };
+        if let Some((t, b, c)) = self.on.leaf(self.ray, &self.sheared, leaf, self.t) {
+            let of = |leaf: usize| self.on.primitives.get(leaf);
+            if t < self.t || of(leaf) < of(self.leaf) || self.leaf == usize::MAX {
+                (self.t, self.leaf, self.weights) = (t, leaf, [b, c]);
                 *limit = self.start.before(t);
             }
         }

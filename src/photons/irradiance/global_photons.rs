@@ -30,7 +30,7 @@ impl GlobalPhotons {
     pub fn new(stored: &StoredPhotons, kinds: &[PhotonKind]) -> Self {
         let all: Vec<&[Photon]> = kinds.iter().map(|&kind| stored.of(kind)).collect();
         let each = || all.iter().flat_map(|photons| photons.iter());
-        let tree = KdTree::new(each().map(|p| p.position));
+        let tree = KdTree::with_small_leaves(each().map(|p| p.position));
         let mut starts = Vec::with_capacity(all.len());
         let mut next = 0;
         for photons in &all {
@@ -119,5 +119,5 @@ pub struct Search {
 
 /// Memory of so many photons, bytes.
 pub fn bytes(photons: usize) -> usize {
-    photons * (size_of::<GlobalPhoton>() + crate::photons::kd_tree::BYTES_PER_ENTRY)
+    photons * (size_of::<GlobalPhoton>() + crate::photons::kd_tree::BYTES_PER_ENTRY_OF_SMALL_LEAVES)
 }

@@ -4,7 +4,7 @@ use crate::math::rgb::{Rgb, in_f32};
 use crate::photons::footprint::FilterTransform;
 use crate::photons::irradiance::surface_area::SurfaceAreas;
 use crate::photons::irradiance::{GlobalPhotons, agree};
-use crate::photons::kd_tree::{BYTES_PER_ENTRY, KdTree};
+use crate::photons::kd_tree::{BYTES_PER_ENTRY_OF_SMALL_LEAVES, KdTree};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use std::f64::consts::PI;
@@ -111,7 +111,7 @@ impl Layer {
     fn cell_means(&self, kept: &[u32]) -> Vec<IrradianceEstimate> {
         let all = &self.estimates;
         let of_kept = |i: u32| &all[kept[i as usize] as usize];
-        let tree = KdTree::new((0..kept.len() as u32).map(|i| of_kept(i).position));
+        let tree = KdTree::with_small_leaves((0..kept.len() as u32).map(|i| of_kept(i).position));
         let nearest = |e: &IrradianceEstimate| {
             tree.nearest_one(e.position, f32::INFINITY, |i| agree(of_kept(i).normal, e.normal)).map(|(i, _)| i)
         };
@@ -132,7 +132,7 @@ impl Layer {
     }
 
     fn new(radius: f32, estimates: &[IrradianceEstimate]) -> Self {
-        let tree = KdTree::new(estimates.iter().map(|e| e.position));
+        let tree = KdTree::with_small_leaves(estimates.iter().map(|e| e.position));
         let estimates = tree.order().iter().map(|&i| estimates[i as usize]).collect();
         Self { radius, estimates, tree: tree.renumbered() }
     }
@@ -191,7 +191,7 @@ impl Layer {
 const ENOUGH: u32 = 8;
 
 /// Memory of an estimate in a layer, bytes.
-pub const BYTES_PER_ESTIMATE: usize = size_of::<IrradianceEstimate>() + BYTES_PER_ENTRY;
+pub const BYTES_PER_ESTIMATE: usize = size_of::<IrradianceEstimate>() + BYTES_PER_ENTRY_OF_SMALL_LEAVES;
 
 /// An ellipse on a surface: the footprint of a ray.
 #[derive(Clone, Copy, Debug)]

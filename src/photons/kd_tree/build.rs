@@ -12,10 +12,10 @@ pub(super) fn node_count(entries: usize, leaf: usize) -> usize {
     }
 }
 
-/// Entries of the left half of `n`, more than `leaf`: whole blocks, so that only the last leaf of a tree has one that is not
-/// full.
+/// Entries of the left half of `n`, more than `leaf`: whole blocks where leaves have them, so that only the last leaf of a tree
+/// has one that is not full.
 fn half(n: usize, leaf: usize) -> usize {
-    if leaf < LANES { n / 2 } else { (n / 2).next_multiple_of(LANES) }
+    if leaf.is_multiple_of(LANES) { (n / 2).next_multiple_of(LANES) } else { n / 2 }
 }
 
 /// Entries from which the halves of a node are built on two threads.

@@ -18,6 +18,9 @@ use scan::{Search, SearchNearest, SearchOne, SearchWithin};
 /// Entries in a leaf, scanned in one go.
 const LEAF: usize = 32;
 
+/// Entries in a small leaf.
+const SMALL_LEAF: usize = 12;
+
 /// Entries of a block.
 const LANES: usize = 8;
 
@@ -52,6 +55,10 @@ impl Block {
 
 /// Memory of one entry: its place in a block and in the order, and two nodes for every leaf, which is half full at least.
 pub const BYTES_PER_ENTRY: usize = size_of::<Block>() / LANES + size_of::<u32>() + 4 * size_of::<Node>() / LEAF;
+
+/// The same for [`KdTree::with_small_leaves`].
+pub const BYTES_PER_ENTRY_OF_SMALL_LEAVES: usize =
+    2 * size_of::<Block>() / (LANES + 1) + size_of::<u32>() + 4 * size_of::<Node>() / SMALL_LEAF;
 
 /// Memory of one entry while the tree is built, beside that of the tree.
 pub const BYTES_PER_BUILT_ENTRY: usize = size_of::<(Vec3, u32)>();
@@ -121,6 +128,11 @@ impl KdTree {
     /// Builds over positions; entry `i` is reported as index `i`. The tree does not depend on the number of threads.
     pub fn new(positions: impl Iterator<Item = Vec3>) -> Self {
         Self::with_leaves(positions, LEAF)
+    }
+
+    /// The same with small leaves, for searches that look for one entry or for a few.
+    pub fn with_small_leaves(positions: impl Iterator<Item = Vec3>) -> Self {
+        Self::with_leaves(positions, SMALL_LEAF)
     }
 
     /// The same with leaves of `leaf` entries at most, one or more. What a query finds does not depend on it.

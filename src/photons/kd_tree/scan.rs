@@ -82,7 +82,7 @@ fn offset(block: &Block, lane: usize, center: Vec3) -> Vec3 {
     Vec3::new(block.x[lane] - center.x, block.y[lane] - center.y, block.z[lane] - center.z)
 }
 
-/// The least of a block's distances; what is no number is none.
+/// The least of a block's distances, infinite at most; what is no number is none.
 #[inline(always)]
 fn least(distances: &[f32; LANES]) -> f32 {
     distances.iter().fold(f32::INFINITY, |least, &d| if d < least { d } else { least })
@@ -109,14 +109,14 @@ impl<V: Volume, A: Fn(u32) -> bool> Scan for SearchNearest<'_, V, A> {
         let worst = self.found.worst();
         for block in blocks {
             let distances = distances(block, self.center, |offset| self.volume.squared(offset));
-            if !(least(&distances) <= worst) {
+            if least(&distances) > worst {
                 continue;
             }
             // Those near enough put together without a branch for each, which half of the time would go wrong.
             let (mut near, mut count) = ([0u64; LANES], 0usize);
-            for lane in 0..LANES {
-                near[count % LANES] = u64::from(distances[lane].to_bits()) << 32 | u64::from(block.index[lane]);
-                count += usize::from(distances[lane] <= worst);
+            for (distance, index) in distances.iter().zip(&block.index) {
+                near[count % LANES] = u64::from(distance.to_bits()) << 32 | u64::from(*index);
+                count += usize::from(*distance <= worst);
             }
             for &key in &near[..count.min(LANES)] {
                 if (self.accept)(key as u32) {
@@ -146,11 +146,11 @@ impl<F: FnMut(u32, Vec3)> Scan for SearchWithin<F> {
     fn leaf(&mut self, blocks: &[Block]) {
         for block in blocks {
             let distances = distances(block, self.center, squared);
-            if !(least(&distances) <= self.limit) {
+            if least(&distances) > self.limit {
                 continue;
             }
-            for lane in 0..LANES {
-                if distances[lane] <= self.limit {
+            for (lane, distance) in distances.into_iter().enumerate() {
+                if distance <= self.limit {
                     (self.visit)(block.index[lane], offset(block, lane, self.center));
                 }
             }
@@ -177,11 +177,10 @@ impl<A: Fn(u32) -> bool> Scan for SearchOne<A> {
     fn leaf(&mut self, blocks: &[Block]) {
         for block in blocks {
             let distances = distances(block, self.center, squared);
-            if !(least(&distances) <= self.limit) {
+            if least(&distances) > self.limit {
                 continue;
             }
-            for lane in 0..LANES {
-                let (squared, index) = (distances[lane], block.index[lane]);
+            for (squared, &index) in distances.into_iter().zip(&block.index) {
                 let nearer =
                     squared < self.limit || squared == self.limit && self.best.is_none_or(|(best, _)| index < best);
                 if nearer && (self.accept)(index) {
