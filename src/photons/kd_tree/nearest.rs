@@ -12,7 +12,7 @@ pub struct Nearest {
     /// Bits of the distance above those of the index.
     entries: Vec<u64>,
     k: usize,
-    /// Squared distance beyond which nothing is among the nearest.
+    /// Squared distance beyond which nothing is among the nearest, metres².
     worst: f32,
     /// Centre, radius and k of the last search that found all it was asked for.
     last: Option<(Vec3, f32, usize)>,
@@ -60,10 +60,10 @@ impl Nearest {
         (away < radius).then(|| ((radius + away) * WIDER).powi(2))
     }
 
-    /// Keeps what [`Nearest::expected`] needs.
+    /// Keeps what [`Nearest::expected`] needs, after a search for `k`, one or more, about `center`.
     pub(super) fn remember(&mut self, center: Vec3, k: usize) {
-        let farthest = self.farthest().filter(|_| self.len() == k);
-        self.last = farthest.map(|(bits, _)| (center, f32::from_bits(bits).sqrt(), k));
+        // With all k found the farthest of them is what bounds the rest.
+        self.last = (self.len() == k).then(|| (center, self.worst.sqrt(), k));
     }
 
     /// Starts a search for `k`, one or more, up to a squared distance; entries of others that are there compete.

@@ -67,25 +67,21 @@ impl<S: Scan> WithSimd for Search<'_, S> {
     }
 }
 
-/// Distances of a block's entries from a centre.
+/// Squared distances of a block's entries from a centre, metres²; None if all are beyond `limit`.
 #[inline(always)]
-fn distances(block: &Block, center: Vec3, distance: impl Fn(Vec3) -> f32) -> [f32; LANES] {
+fn near(block: &Block, center: Vec3, limit: f32, distance: impl Fn(Vec3) -> f32) -> Option<[f32; LANES]> {
     let mut all = [0.0; LANES];
     for (lane, d) in all.iter_mut().enumerate() {
         *d = distance(offset(block, lane, center));
     }
-    all
+    // What is no number is never the least.
+    let least = all.iter().fold(f32::INFINITY, |least, &d| if d < least { d } else { least });
+    (least <= limit).then_some(all)
 }
 
 #[inline(always)]
 fn offset(block: &Block, lane: usize, center: Vec3) -> Vec3 {
     Vec3::new(block.x[lane] - center.x, block.y[lane] - center.y, block.z[lane] - center.z)
-}
-
-/// The least of a block's distances, infinite at most; what is no number is none.
-#[inline(always)]
-fn least(distances: &[f32; LANES]) -> f32 {
-    distances.iter().fold(f32::INFINITY, |least, &d| if d < least { d } else { least })
 }
 
 /// Looks for the k nearest by the distance of a volume.
@@ -108,10 +104,8 @@ impl<V: Volume, A: Fn(u32) -> bool> Scan for SearchNearest<'_, V, A> {
         let before = self.found.len();
         let worst = self.found.worst();
         for block in blocks {
-            let distances = distances(block, self.center, |offset| self.volume.squared(offset));
-            if least(&distances) > worst {
-                continue;
-            }
+            let distance = |offset| self.volume.squared(offset);
+            let Some(distances) = near(block, self.center, worst, distance) else { continue };
             // Those near enough put together without a branch for each, which half of the time would go wrong.
             let (mut near, mut count) = ([0u64; LANES], 0usize);
             for (distance, index) in distances.iter().zip(&block.index) {
@@ -145,10 +139,7 @@ impl<F: FnMut(u32, Vec3)> Scan for SearchWithin<F> {
     #[inline(always)]
     fn leaf(&mut self, blocks: &[Block]) {
         for block in blocks {
-            let distances = distances(block, self.center, squared);
-            if least(&distances) > self.limit {
-                continue;
-            }
+            let Some(distances) = near(block, self.center, self.limit, squared) else { continue };
             for (lane, distance) in distances.into_iter().enumerate() {
                 if distance <= self.limit {
                     (self.visit)(block.index[lane], offset(block, lane, self.center));
@@ -176,10 +167,7 @@ impl<A: Fn(u32) -> bool> Scan for SearchOne<A> {
     #[inline(always)]
     fn leaf(&mut self, blocks: &[Block]) {
         for block in blocks {
-            let distances = distances(block, self.center, squared);
-            if least(&distances) > self.limit {
-                continue;
-            }
+            let Some(distances) = near(block, self.center, self.limit, squared) else { continue };
             for (squared, &index) in distances.into_iter().zip(&block.index) {
                 let nearer =
                     squared < self.limit || squared == self.limit && self.best.is_none_or(|(best, _)| index < best);
