@@ -65,6 +65,7 @@ fn a_photon_pass_allocates_by_chunks() {
                     scene: &pass.scene,
                     intersector: &pass.intersector,
                     path: pass.plan.path_settings(&pass.settings),
+                    projection: pass.plan.projection.as_deref(),
                     sampling: pass.settings.sampling,
                     photons: pass.settings.photons,
                     seed: pass.settings.seed,

@@ -49,6 +49,9 @@ pub struct CommonFlags {
     /// Rule for footprints at diffuse bounces: polar or as_published
     #[arg(long, value_name = "RULE")]
     pub diffuse_spread: Option<String>,
+    /// Whether caustic photons are emitted towards specular surfaces alone: where that pays (auto), or never (off)
+    #[arg(long, value_name = "WHEN")]
+    pub projection_map: Option<String>,
     /// Surfaces that a path may meet
     #[arg(long, value_name = "N", value_parser = count, allow_negative_numbers = true)]
     pub max_depth: Option<i64>,
@@ -119,6 +122,7 @@ impl CommonFlags {
         over(&mut render.shadow_rays, &self.shadow_rays);
         over(&mut render.sampling, &self.sampling);
         over(&mut render.diffuse_spread, &self.diffuse_spread);
+        over(&mut render.projection_map, &self.projection_map);
     }
 
     /// The scene's settings with these flags on top.

@@ -29,10 +29,21 @@ pub struct LightShare {
 /// All photons carry the same mean power `Φ_scene/total` (eq. 3), but those of a light too dim for a whole photon:
 /// it sends one, with all its power. Lights without power send none.
 pub fn share_photons(scene: &Scene, total: u64, sequence: &Sequence) -> Vec<LightShare> {
-    let flux = scene.total_flux();
+    share_among(scene, total, sequence, |_| 1.0)
+}
+
+/// The same among parts of the lights: `part` tells what share of its power each sends out, in `[0, 1]`.
+pub fn share_among(
+    scene: &Scene,
+    total: u64,
+    sequence: &Sequence,
+    part: impl Fn(usize) -> f64,
+) -> Vec<LightShare> {
+    let flux: f64 = scene.lights.iter().enumerate().map(|(i, l)| f64::from(mean(l.flux())) * part(i)).sum();
     let mut shares = Vec::new();
     for (light, l) in scene.lights.iter().enumerate() {
-        let own = f64::from(mean(l.flux()));
+        let whole = f64::from(mean(l.flux()));
+        let own = whole * part(light);
         // Not `own <= 0`: a flux that is no number must not pass.
         if !(own > 0.0 && flux.is_finite()) {
             continue;
@@ -46,7 +57,7 @@ pub fn share_photons(scene: &Scene, total: u64, sequence: &Sequence) -> Vec<Ligh
             let x = f64::from(sequence.four(light as u64, 0)[0]);
             ((expected + x).floor().max(1.0) as u64, flux / total as f64)
         };
-        shares.push(LightShare { light, count, power: (l.flux().as_dvec3() * (power / own)).as_vec3() });
+        shares.push(LightShare { light, count, power: (l.flux().as_dvec3() * (power / whole)).as_vec3() });
     }
     shares
 }
@@ -64,8 +75,8 @@ pub struct Emission {
     pub bounded: bool,
 }
 
-/// Starts one of `count` photons of a light from four numbers in `[0, 1)`.
-pub fn emit(scene: &Scene, light: &Light, count: u64, x: [f32; 4]) -> Emission {
+/// Starts one photon of a light from four numbers in `[0, 1)`, where `count` photons would share the whole of it.
+pub fn emit(scene: &Scene, light: &Light, count: f64, x: [f32; 4]) -> Emission {
     let n = count as f32;
     let from_point = |origin: Vec3, direction: Vec3, solid_angle: f32| Emission {
         origin,
@@ -73,8 +84,7 @@ pub fn emit(scene: &Scene, light: &Light, count: u64, x: [f32; 4]) -> Emission {
         differential: cone_differential(direction, solid_angle),
         bounded: false,
     };
-    let from_surface = |position: Vec3, normal: Vec3| {
-        let direction = cosine_hemisphere(normal, x[2], x[3]);
+    let leaves = |position: Vec3, normal: Vec3, direction: Vec3| {
         let (solid_angle, bounded) = cosine_solid_angle(n, direction.dot(normal));
         Emission {
             origin: position + normal * (scene.radius * SELF_INTERSECTION),
@@ -83,17 +93,24 @@ pub fn emit(scene: &Scene, light: &Light, count: u64, x: [f32; 4]) -> Emission {
             bounded,
         }
     };
+    let from_surface =
+        |position: Vec3, normal: Vec3| leaves(position, normal, cosine_hemisphere(normal, x[2], x[3]));
     match light {
         Light::Point { position, .. } => from_point(*position, uniform_sphere(x[0], x[1]).normalize(), 4.0 * PI / n),
         Light::Spot { position, direction: axis, cos_half, falloff, .. } => {
             let (below, density) = spot_cosine(*cos_half, f64::from(*falloff), f64::from(x[0]));
             let whole = Light::spot_normalization(*cos_half, *falloff);
-            let solid_angle = (whole / (count as f64 * density)) as f32;
+            let solid_angle = (whole / (count * density)) as f32;
             from_point(*position, near_axis(*axis, below, f64::from(x[1])), solid_angle)
         }
         Light::Sphere { center, radius, .. } => {
-            let normal = uniform_sphere(x[0], x[1]).normalize();
-            from_surface(*center + normal * *radius, normal)
+            // All directions are as likely, and then all places of the disc that it sees: the cosine of the normal's
+            // angle to it is as likely as a diffuse surface's.
+            let direction = uniform_sphere(x[0], x[1]).normalize();
+            let (t, b) = tangents(direction);
+            let (dx, dy) = concentric_disc(x[2], x[3]);
+            let normal = (t * dx + b * dy + direction * (1.0 - dx * dx - dy * dy).max(0.0).sqrt()).normalize();
+            leaves(*center + normal * *radius, normal, direction)
         }
         Light::Quad { center, u, v, .. } => {
             let position = *center + *u * (2.0 * x[0] - 1.0) + *v * (2.0 * x[1] - 1.0);
@@ -134,7 +151,7 @@ fn cone_differential(direction: Vec3, solid_angle: f32) -> Differential {
 }
 
 /// What the cosine to a spot's axis lacks of 1 for a number in `[0, 1)`, and the intensity there over that on the axis.
-fn spot_cosine(cos_half: f64, falloff: f64, u: f64) -> (f64, f64) {
+pub(super) fn spot_cosine(cos_half: f64, falloff: f64, u: f64) -> (f64, f64) {
     if falloff == 0.0 {
         return (u * (1.0 - cos_half), 1.0);
     }
@@ -223,7 +240,7 @@ mod tests {
             let scene = plane_with(vec![light.clone()]);
             let mut sum = 0.0;
             for i in 0..n {
-                let e = emit(&scene, &light, n, sequence.four(i, 0));
+                let e = emit(&scene, &light, n as f64, sequence.four(i, 0));
                 sum += PI * e.differential.dv[0].cross(e.differential.dv[1]).length();
             }
             assert!((sum / omega - 1.0).abs() < 1e-3, "{sum} {omega}");
@@ -241,7 +258,7 @@ mod tests {
             disc_radius: 2.0,
         };
         let scene = plane_with(vec![light.clone()]);
-        let e = emit(&scene, &light, 100, [0.2, 0.3, 0.0, 0.0]);
+        let e = emit(&scene, &light, 100.0, [0.2, 0.3, 0.0, 0.0]);
         let area = PI * e.differential.dp[0].cross(e.differential.dp[1]).length();
         assert!((area - PI * 4.0 / 100.0).abs() < 1e-5);
         assert_eq!(e.differential.dv, [Vec3::ZERO; 2]);
@@ -262,7 +279,7 @@ mod tests {
             };
             let scene = plane_with(vec![light.clone()]);
             let mean: f64 =
-                (0..n).map(|i| f64::from(-emit(&scene, &light, n, sequence.four(i, 0)).direction.y)).sum::<f64>()
+                (0..n).map(|i| f64::from(-emit(&scene, &light, n as f64, sequence.four(i, 0)).direction.y)).sum::<f64>()
                     / n as f64;
             let c = f64::from(half.cos());
             let m = f64::from(falloff);

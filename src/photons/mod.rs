@@ -8,6 +8,7 @@ pub mod map;
 pub mod overlap;
 pub mod path;
 pub mod photon;
+pub mod projection;
 pub mod spread;
 
 pub use map::{MapPhoton, PhotonMap};

@@ -27,6 +27,8 @@ pub struct PathSettings {
     pub caustic: bool,
     /// Keep global photons: paths go on after a diffuse bounce.
     pub global: bool,
+    /// Caustic photons are emitted by themselves, through the marked cells of a projection map.
+    pub projected: bool,
     /// Carry differentials; without them footprints are zero.
     pub differentials: bool,
     /// Rule for diffuse bounces.

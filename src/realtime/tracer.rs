@@ -171,7 +171,7 @@ impl Path<'_> {
         } else {
             [u, v, 0.0, 0.0]
         };
-        let start = emit(self.scene, light, share.count as u64, x);
+        let start = emit(self.scene, light, share.count as f64, x);
         let ray = Ray { origin: start.origin, direction: start.direction };
         self.follow(ray, share.power, 0, branch, self.s.store_direct_light);
     }

@@ -34,7 +34,7 @@ impl PartialEq for World<'_> {
 ///
 /// Which kinds are stored depends on the plan too; [`PhotonStore`] looks after that.
 pub fn photons_are_kept(old: &RenderSettings, new: &RenderSettings) -> bool {
-    let of = |s: &RenderSettings| (s.photons, s.max_depth, s.sampling, s.diffuse_spread, s.seed);
+    let of = |s: &RenderSettings| (s.photons, s.max_depth, s.sampling, s.diffuse_spread, s.projection_map, s.seed);
     of(old) == of(new)
 }
 
@@ -114,6 +114,7 @@ mod tests {
         direct: false,
         caustic: true,
         global: false,
+        projected: false,
         differentials: true,
         spread: DiffuseSpread::Polar,
     };

@@ -96,6 +96,7 @@ impl Pass {
             scene: &self.scene,
             intersector: &self.intersector,
             path: self.plan.path_settings(&self.settings),
+            projection: self.plan.projection.as_deref(),
             sampling: self.settings.sampling,
             photons: self.settings.photons,
             seed: self.settings.seed,

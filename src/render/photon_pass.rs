@@ -4,9 +4,10 @@ use crate::estimate::Estimator;
 use crate::math::hash::mix;
 use crate::math::rgb::{Rgb, mean};
 use crate::math::sequence::{Sampling, Sequence};
-use crate::photons::emission::{Emission, LightShare, emit, share_photons};
+use crate::photons::emission::{Emission, LightShare, emit, share_among, share_photons};
 use crate::photons::map::{FootprintLimits, MapParts};
 use crate::photons::path::{Flight, PathCounts, PathSettings, PhotonRecorder, SpecularBounds, Unrecorded};
+use crate::photons::projection::{Cells, ProjectionMap};
 use crate::photons::{PhotonKind, PhotonMap, StoredPhotons};
 use crate::render::plan::Plan;
 use crate::scene::Scene;
@@ -28,6 +29,8 @@ pub struct Emitter<'a> {
     pub intersector: &'a Intersector,
     /// How paths are followed.
     pub path: PathSettings,
+    /// Cells that caustic photons are emitted through by themselves, if paths are followed so.
+    pub projection: Option<&'a ProjectionMap>,
     /// Numbers that photons are made of.
     pub sampling: Sampling,
     /// Photons to emit.
@@ -122,8 +125,8 @@ impl Emitter<'_> {
             if let Some(again) = own.get(index - before) {
                 let same = again.position == stored.position && again.power == stored.power;
                 return same.then(|| departures.send(&flight, chunk, number, &mut part, recorder)).map(|emission| {
-                    let share = &departures.shares[chunk.share];
-                    Departure { light: share.light, number, power: share.power, emission, nth: index - before }
+                    let LightShare { light, power, .. } = departures.beams[chunk.beam].share;
+                    Departure { light, number, power, emission, nth: index - before }
                 });
             }
             before += own.len();
@@ -147,45 +150,76 @@ pub struct Departure {
     pub nth: usize,
 }
 
-/// Photons of one light that one thread follows.
+/// Photons of one light that are emitted alike.
+struct Beam<'a> {
+    share: LightShare,
+    /// Photons that would share the whole of the light, each with as much of it.
+    whole: f64,
+    /// The cells that they leave through; None for all.
+    cells: Option<&'a Cells>,
+    path: PathSettings,
+    sequence: Sequence,
+}
+
+/// Photons of one beam that one thread follows.
 #[derive(Clone, Copy)]
 struct Chunk {
-    share: usize,
+    beam: usize,
     first: u64,
 }
 
 /// The photons of a pass before they fly.
 struct Departures<'a> {
     emitter: &'a Emitter<'a>,
-    seed: u64,
-    shares: Vec<LightShare>,
+    beams: Vec<Beam<'a>>,
     chunks: Vec<Chunk>,
     aim: Option<SpecularBounds>,
 }
 
 impl<'a> Departures<'a> {
     fn new(emitter: &'a Emitter<'a>, pass: u64) -> Self {
+        let Emitter { scene, path, projection, sampling, photons, .. } = *emitter;
         let seed = mix(mix(emitter.seed, 0x70_686f_746f_6e73), pass);
-        let shares = share_photons(emitter.scene, emitter.photons, &Sequence::new(Sampling::Random, seed));
-        let of = |(share, s): (usize, &LightShare)| {
-            (0..s.count).step_by(CHUNK as usize).map(move |first| Chunk { share, first })
+        let projection = projection.filter(|_| path.projected && path.caustic);
+        let others = path.direct || path.global;
+        // Half of them each, where other maps want photons too.
+        let aimed = if others { photons - photons / 2 } else { photons };
+        let mut beams = Vec::new();
+        if let Some(map) = projection {
+            let seed = mix(seed, 0x6361_7573_7469_63);
+            let random = Sequence::new(Sampling::Random, seed);
+            let path = PathSettings { direct: false, global: false, ..path };
+            for share in share_among(scene, aimed, &random, |light| map.light(light).share()) {
+                let cells = map.light(share.light);
+                let sequence = Sequence::new(sampling, mix(seed, share.light as u64));
+                beams.push(Beam { share, whole: share.count as f64 / cells.share(), cells: Some(cells), path, sequence });
+            }
+        }
+        if projection.is_none() || others {
+            let photons = if projection.is_some() { photons - aimed } else { photons };
+            let path = PathSettings { caustic: path.caustic && projection.is_none(), ..path };
+            for share in share_photons(scene, photons, &Sequence::new(Sampling::Random, seed)) {
+                let sequence = Sequence::new(sampling, mix(seed, share.light as u64));
+                beams.push(Beam { share, whole: share.count as f64, cells: None, path, sequence });
+            }
+        }
+        let of = |(beam, b): (usize, &Beam)| {
+            (0..b.share.count).step_by(CHUNK as usize).map(move |first| Chunk { beam, first })
         };
-        let chunks = shares.iter().enumerate().flat_map(of).collect();
+        let chunks = beams.iter().enumerate().flat_map(of).collect();
         // Where nothing but caustic photons is kept, those that cannot meet a specular surface need not be followed.
-        let path = &emitter.path;
-        let only_caustic = path.caustic && !path.direct && !path.global;
-        let aim = if only_caustic { SpecularBounds::of(emitter.scene) } else { None };
-        Self { emitter, seed, shares, chunks, aim }
+        let aim = if path.caustic && !others { SpecularBounds::of(scene) } else { None };
+        Self { emitter, beams, chunks, aim }
     }
 
     fn flight(&self, chunk: Chunk) -> Flight<'a> {
-        let Emitter { scene, intersector, path, sampling, .. } = *self.emitter;
-        let light = self.shares[chunk.share].light as u64;
-        Flight { scene, intersector, settings: path, sequence: Sequence::new(sampling, mix(self.seed, light)) }
+        let Emitter { scene, intersector, .. } = *self.emitter;
+        let Beam { path, sequence, .. } = self.beams[chunk.beam];
+        Flight { scene, intersector, settings: path, sequence }
     }
 
     fn numbers(&self, chunk: Chunk) -> Range<u64> {
-        chunk.first..(chunk.first + CHUNK).min(self.shares[chunk.share].count)
+        chunk.first..(chunk.first + CHUNK).min(self.beams[chunk.beam].share.count)
     }
 
     /// All photons of a chunk.
@@ -207,9 +241,11 @@ impl<'a> Departures<'a> {
         part: &mut PhotonPass,
         recorder: &mut impl PhotonRecorder,
     ) -> Emission {
-        let share = &self.shares[chunk.share];
+        let Beam { share, whole, cells, .. } = &self.beams[chunk.beam];
         let scene = self.emitter.scene;
-        let emission = emit(scene, &scene.lights[share.light], share.count, flight.sequence.four(number, 0));
+        let x = flight.sequence.four(number, 0);
+        let x = cells.map_or(x, |c| c.numbers(x));
+        let emission = emit(scene, &scene.lights[share.light], *whole, x);
         part.emitted += 1;
         if self.aim.is_none_or(|a| a.may_meet(emission.origin, emission.direction)) {
             let (out, counts) = (&mut part.stored, &mut part.counts);

@@ -4,11 +4,16 @@ use crate::estimate::registry::{needs_photon_footprint, needs_view_footprint};
 use crate::estimate::{Estimator, FinalGatherMethod, FinalGathering, Lookup};
 use crate::photons::map::MapParts;
 use crate::photons::path::PathSettings;
+use crate::photons::projection::ProjectionMap;
 use crate::render::photon_pass::{self, Emitter};
-use crate::render::settings::{DirectLight, Gather, LightPart, PlanMode, RenderSettings};
+use crate::render::settings::{DirectLight, Gather, LightPart, PlanMode, Projection, RenderSettings};
 use crate::scene::{Light, Scene};
 use crate::trace::Intersector;
 use serde::Serialize;
+use std::sync::Arc;
+
+/// Share of the lights' power towards specular surfaces from which on a projection map is not worth having.
+pub const WORTHWHILE_SHARE: f64 = 0.5;
 
 /// Photons that the plan sends ahead to see where light goes.
 pub const PILOT_PHOTONS: u64 = 65_536;
@@ -33,6 +38,9 @@ pub struct Plan {
     pub caustic_map: bool,
     /// Global photons are stored, and estimators look them up.
     pub global_map: bool,
+    /// Where caustic photons leave their lights, if they are emitted by themselves.
+    #[serde(skip)]
+    pub projection: Option<Arc<ProjectionMap>>,
     /// The final gatherings that run. Where there is one, photons of all kinds are stored.
     pub final_gatherings: Vec<FinalGathering>,
     /// Direct light comes from shadow rays.
@@ -134,11 +142,32 @@ impl Plan {
                 _ => "there is no global map".into(),
             },
         );
+        let projection = pilot.and_then(|p| p.projection.clone()).filter(|p| {
+            let pays = p.share() < WORTHWHILE_SHARE && !gathers;
+            caustic_map && pays && !full && settings.projection_map == Projection::Auto
+        });
+        let share = pilot.and_then(|p| p.projection.as_ref()).map_or(0.0, |p| 100.0 * p.share());
+        item(
+            "projection map",
+            projection.is_some(),
+            match settings.projection_map {
+                _ if !caustic_map => "there is no caustic map".into(),
+                Projection::Off => "turned off".into(),
+                Projection::Auto if full => "it would leave photons out".into(),
+                Projection::Auto if gathers => "final gathering looks up photons of equal power".into(),
+                Projection::Auto => format!("{share:.3} % of the lights' power leaves towards specular surfaces"),
+            },
+        );
         let only_caustic = caustic_map && !global_map && !direct_by_photons && !gathers;
         item(
             "photons that miss all specular surfaces",
             !only_caustic && (caustic_map || global_map || direct_by_photons || gathers),
-            if only_caustic { "they cannot become caustic".into() } else { "followed with the others, if any".into() },
+            match (only_caustic, projection.is_some()) {
+                (true, true) => "they are not emitted".into(),
+                (true, false) => "they cannot become caustic".into(),
+                (false, true) => "half of the photons, for the other maps".into(),
+                (false, false) => "followed with the others, if any".into(),
+            },
         );
         let direct_map = direct_by_photons;
         item(
@@ -229,6 +258,7 @@ impl Plan {
             direct_map,
             caustic_map,
             global_map,
+            projection,
             final_gatherings,
             shadow_rays,
             emission,
@@ -289,6 +319,7 @@ impl Plan {
             direct: self.direct_map || self.gathers(),
             caustic: self.caustic_map || self.gathers(),
             global: self.bounces(),
+            projected: self.projection.is_some(),
             differentials: self.photon_differentials,
             spread: settings.diffuse_spread,
         }
@@ -311,12 +342,13 @@ fn gatherings(slots: &[Slot]) -> Vec<FinalGathering> {
     all
 }
 
-/// Photons sent ahead of a render, to see where light goes.
-#[derive(Clone, Copy, Debug)]
+/// Photons sent ahead of a render, to see where light goes, and where it may meet specular surfaces.
+#[derive(Clone, Debug)]
 pub struct Pilot {
     emitted: u64,
     caustic: u64,
     global: u64,
+    projection: Option<Arc<ProjectionMap>>,
 }
 
 impl Pilot {
@@ -332,13 +364,15 @@ impl Pilot {
             direct: false,
             caustic: true,
             global: true,
+            projected: false,
             differentials: false,
             spread: settings.diffuse_spread,
         };
         let (sampling, seed) = (settings.sampling, settings.seed);
-        let emitter = Emitter { scene, intersector, path, sampling, photons: PILOT_PHOTONS, seed };
+        let photons = PILOT_PHOTONS;
+        let emitter = Emitter { scene, intersector, path, projection: None, sampling, photons, seed };
         let (emitted, [_, caustic, global]) = emitter.count(photon_pass::PILOT_PASS);
-        Self { emitted, caustic, global }
+        Self { emitted, caustic, global, projection: ProjectionMap::new(scene).map(Arc::new) }
     }
 
     /// Caustic and global photons that were stored for each that was emitted. Where none was, as many as the rule of

@@ -404,11 +404,12 @@ impl Renderer {
     }
 
     /// What traces photons under `plan` and `settings`, which may ask for another number of photons.
-    pub fn emitter(&self, plan: &Plan, settings: &RenderSettings) -> Emitter<'_> {
+    pub fn emitter<'a>(&'a self, plan: &'a Plan, settings: &RenderSettings) -> Emitter<'a> {
         Emitter {
             scene: &self.scene,
             intersector: &self.intersector,
             path: plan.path_settings(settings),
+            projection: plan.projection.as_deref(),
             sampling: settings.sampling,
             photons: settings.photons,
             seed: settings.seed,

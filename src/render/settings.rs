@@ -66,6 +66,17 @@ pub enum PlanMode {
     Full,
 }
 
+/// Whether caustic photons are emitted towards specular surfaces alone.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Default)]
+#[serde(rename_all = "snake_case")]
+pub enum Projection {
+    /// Where the plan finds that it pays.
+    #[default]
+    Auto,
+    /// Never: photons leave the lights everywhere.
+    Off,
+}
+
 /// Everything that decides an image, but the scene and the estimators.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RenderSettings {
@@ -96,6 +107,9 @@ pub struct RenderSettings {
     pub sampling: Sampling,
     /// Rule for diffuse bounces.
     pub diffuse_spread: DiffuseSpread,
+    /// Whether caustic photons are emitted by a projection map.
+    #[serde(default)]
+    pub projection_map: Projection,
     /// Pixels across and down.
     pub size: [u32; 2],
     /// Seed of everything random.
@@ -175,6 +189,12 @@ impl RenderSettings {
                 |f| f.diffuse_spread.as_deref(),
                 DiffuseSpread::Polar,
                 &[("polar", DiffuseSpread::Polar), ("as_published", DiffuseSpread::AsPublished)],
+            )?,
+            projection_map: pick.choice(
+                "projection_map",
+                |f| f.projection_map.as_deref(),
+                Projection::Auto,
+                &[("auto", Projection::Auto), ("off", Projection::Off)],
             )?,
             size: size.unwrap_or(scene.camera.resolution),
             seed,

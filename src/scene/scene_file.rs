@@ -234,6 +234,9 @@ pub struct RenderFile {
     /// polar or as_published.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub diffuse_spread: Option<String>,
+    /// auto or off.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub projection_map: Option<String>,
 }
 
 /// `[realtime]`: parameters of real-time photon mapping (Kristensen and Ottosen 2003, chapter 6), and ours.

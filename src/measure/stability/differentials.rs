@@ -351,7 +351,7 @@ fn emission() -> Outcome {
                 Light::Spot { position, direction: axis, cos_half, falloff, power: Rgb::ONE }
             }
         };
-        let sent = emit(&scene, &light, count, x);
+        let sent = emit(&scene, &light, count as f64, x);
         let w = sent.direction.as_dvec3().normalize();
         let (solid_angle, exact_angle) = match i % 4 {
             0 => (4.0 * PI / n, None),

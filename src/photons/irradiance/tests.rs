@@ -20,6 +20,7 @@ fn traced(scene: &Scene, count: u64) -> StoredPhotons {
         direct: true,
         caustic: true,
         global: true,
+        projected: false,
         differentials: false,
         spread: Default::default(),
     };
@@ -28,7 +29,7 @@ fn traced(scene: &Scene, count: u64) -> StoredPhotons {
         let sequence = Sequence::new(Sampling::Sobol, 5 + share.light as u64);
         let flight = Flight { scene, intersector: &intersector, settings, sequence };
         for number in 0..share.count {
-            let e = emission::emit(scene, &scene.lights[share.light], share.count, sequence.four(number, 0));
+            let e = emission::emit(scene, &scene.lights[share.light], share.count as f64, sequence.four(number, 0));
             let (counts, out) = (&mut PathCounts::default(), &mut stored);
             flight.trace(number, &e, share.power, share.count, out, counts, &mut Unrecorded);
         }

@@ -58,6 +58,11 @@ pub(super) fn show(panes: &mut Panes, ui: &mut Ui) {
         if choice(ui, "Diffuse spread", tip, &mut spread, &["polar", "as_published"]) {
             session.render.diffuse_spread = Some(spread);
         }
+        let mut projection = name(&now.projection_map);
+        let tip = "whether caustic photons leave the lights towards specular surfaces alone: where that pays, or never";
+        if choice(ui, "Projection map", tip, &mut projection, &["auto", "off"]) {
+            session.render.projection_map = Some(projection);
+        }
         let mut depth = i64::from(now.max_depth);
         if integer(ui, "Depth", "surfaces that a path may meet", &mut depth, 1..=100) {
             session.render.max_depth = Some(depth);
@@ -105,7 +110,7 @@ pub(super) fn show(panes: &mut Panes, ui: &mut Ui) {
 mod erased {
     use crate::math::sequence::Sampling;
     use crate::photons::spread::DiffuseSpread;
-    use crate::render::settings::{DirectLight, Gather, LightPart};
+    use crate::render::settings::{DirectLight, Gather, LightPart, Projection};
 
     pub(super) trait Name {
         fn name(&self) -> String;
@@ -122,5 +127,5 @@ mod erased {
         };
     }
 
-    named!(Gather, LightPart, DirectLight, Sampling, DiffuseSpread);
+    named!(Gather, LightPart, DirectLight, Sampling, DiffuseSpread, Projection);
 }

@@ -135,11 +135,12 @@ pub fn emitted(scene: &Scene, settings: &RenderSettings) -> StoredPhotons {
         direct: true,
         caustic: true,
         global: true,
+        projected: false,
         differentials: false,
         spread: settings.diffuse_spread,
     };
     let (sampling, photons, seed) = (settings.sampling, settings.photons, settings.seed);
-    Emitter { scene, intersector: &intersector, path, sampling, photons, seed }.run(0, &interrupted).stored
+    Emitter { scene, intersector: &intersector, path, projection: None, sampling, photons, seed }.run(0, &interrupted).stored
 }
 
 /// Places at the same distance from all four edges; the one that is drawn is the first.
