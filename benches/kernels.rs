@@ -12,7 +12,7 @@ use cusp::photons::irradiance::surface_area::SurfaceAreas;
 use cusp::photons::irradiance::{GlobalPhotons, IrradiancePyramid, PyramidSettings};
 use cusp::photons::kd_tree::Nearest;
 use cusp::photons::map::{FootprintLimits, MapParts, Query};
-use cusp::photons::{Photon, PhotonKind, PhotonMap};
+use cusp::photons::{StoredPhoton, PhotonKind, PhotonMap};
 use cusp::render::Silent;
 use cusp::render::film::{Film, Rect};
 use cusp::render::plan::Slot;
@@ -24,9 +24,9 @@ use glam::{DVec2, DVec3, Vec3};
 use std::hint::black_box;
 
 /// The caustic photons of the ring and a grid of view hits inside it.
-fn ring() -> (Vec<Photon>, Vec<View>) {
+fn ring() -> (Vec<StoredPhoton>, Vec<View>) {
     let scene = open("ring").expect("built in");
-    let flags = RenderFile { photons: Some(450_000), ..Default::default() };
+    let flags = RenderFile { photons: Some(450_000), projection_map: Some("off".into()), ..Default::default() };
     let settings = RenderSettings::new(&scene, &flags, Some([64, 64]), 1).expect("valid");
     let mut renderer = Renderer::new(scene.into(), settings, vec![estimator("integrated").expect("registered")]);
     renderer.step(&Silent);

@@ -64,7 +64,7 @@ fn even_photons(scene: &Scene, count: u64) -> StoredPhotons {
         let power = Vec3::splat(total / count as f32);
         Photon { position, direction: -normal, normal, power, footprint: [Vec3::ZERO; 2] }
     });
-    StoredPhotons { global: photons.collect(), ..Default::default() }
+    StoredPhotons { global: photons.map(Into::into).collect(), ..Default::default() }
 }
 
 fn at(scene: &Scene, x: f64, y: f64, z: f64, normal: Vec3) -> GatherPoint {

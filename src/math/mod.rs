@@ -4,5 +4,6 @@ pub mod angle;
 pub mod elementary;
 pub mod frame;
 pub mod hash;
+pub mod octahedron;
 pub mod rgb;
 pub mod sequence;

@@ -37,6 +37,31 @@ pub struct MapPhoton {
 }
 
 impl MapPhoton {
+    /// A place for a photon.
+    const NONE: Self = Self {
+        position: Vec3::ZERO,
+        inverse_reach: 0.0,
+        rows: [Vec3::ZERO; 2],
+        normal: Vec3::ZERO,
+        direction: Vec3::ZERO,
+        power: Rgb::ZERO,
+        inverse_area: 0.0,
+        turn: Vec2::ZERO,
+    };
+
+    fn new(p: &Photon, t: &FilterTransform) -> Self {
+        Self {
+            position: p.position,
+            inverse_area: t.inverse_area,
+            rows: [t.rows[0], t.rows[1]],
+            turn: t.turn,
+            inverse_reach: 1.0 / t.reach,
+            power: p.power,
+            normal: p.normal,
+            direction: p.direction,
+        }
+    }
+
     /// Filter coordinates of a world vector.
     #[inline]
     pub fn to_filter(&self, v: Vec3) -> Vec3 {
@@ -128,43 +153,66 @@ pub fn map_bytes(parts: MapParts) -> usize {
     size_of::<MapPhoton>() + structures.iter().filter(|(on, _)| *on).map(|(_, bytes)| bytes).sum::<usize>()
 }
 
-/// Memory of a stored photon while a map is built, beside that of the map, bytes.
-pub const PREPARED_BYTES: usize =
-    size_of::<(MapPhoton, FilterTransform)>() + kd_tree::BYTES_PER_BUILT_ENTRY + overlap::BYTES_PER_BUILT_ENTRY;
+/// Memory of a stored photon while a map is built, beyond that of the map, bytes: the overlap structure is finished before
+/// the photons are made ready, the kd-tree is built after that.
+pub const BUILT_BYTES: usize = kd_tree::BYTES_PER_BUILT_ENTRY;
+
+/// Photons that one thread makes ready at a time.
+const CHUNK: usize = 4096;
+
+/// What was met while photons were made ready.
+#[derive(Clone, Copy, Default)]
+struct Limited {
+    floored: u64,
+    capped: u64,
+    longest_reach: f32,
+}
+
+impl Limited {
+    fn and(self, other: Self) -> Self {
+        Self {
+            floored: self.floored + other.floored,
+            capped: self.capped + other.capped,
+            longest_reach: self.longest_reach.max(other.longest_reach),
+        }
+    }
+}
 
 impl PhotonMap {
     /// Prepares photons; the same photons give the same map.
-    pub fn new(photons: &[Photon], limits: FootprintLimits, parts: MapParts) -> Self {
-        let prepared: Vec<(MapPhoton, FilterTransform)> = photons
-            .par_iter()
-            .map(|p| {
-                let t = FilterTransform::new(p.footprint, p.normal, limits.scale, limits.floor, limits.ceiling);
-                let photon = MapPhoton {
-                    position: p.position,
-                    inverse_area: t.inverse_area,
-                    rows: [t.rows[0], t.rows[1]],
-                    turn: t.turn,
-                    inverse_reach: 1.0 / t.reach,
-                    power: p.power,
-                    normal: p.normal,
-                    direction: p.direction,
-                };
-                (photon, t)
-            })
-            .collect();
-        let count = |f: fn(&FilterTransform) -> bool| prepared.iter().filter(|(_, t)| f(t)).count() as u64;
-        let (floored, capped) = (count(|t| t.floored), count(|t| t.capped));
-        let longest_reach = prepared.iter().fold(0.0f32, |m, (_, t)| m.max(t.reach));
-        let (overlap, photons) = if parts.overlap {
-            let tree = OverlapTree::new(prepared.iter().map(|(p, t)| (p.position, t.half_extent)));
-            // In the hierarchy's order, so that a leaf is a range of photons.
-            let photons = tree.order().iter().map(|&i| prepared[i as usize].0).collect();
-            (Some(tree), photons)
-        } else {
-            (None, prepared.iter().map(|(p, _)| *p).collect::<Vec<_>>())
+    pub fn new<P: Copy + Into<Photon> + Sync>(photons: &[P], limits: FootprintLimits, parts: MapParts) -> Self {
+        let transform =
+            |p: &Photon| FilterTransform::new(p.footprint, p.normal, limits.scale, limits.floor, limits.ceiling);
+        let overlap = parts.overlap.then(|| {
+            let bounds = |p: &P| {
+                let p: Photon = (*p).into();
+                (p.position, transform(&p).half_extent)
+            };
+            OverlapTree::new(&photons.par_iter().map(bounds).collect::<Vec<_>>())
+        });
+        // In the order of the overlap structure, so that those that are gathered together lie together.
+        let stored = |i: usize| -> Photon {
+            let place = overlap.as_ref().map_or(i, |tree| tree.order()[i] as usize);
+            photons[place].into()
         };
-        let kd_tree = parts.kd_tree.then(|| KdTree::new(photons.iter().map(|p| p.position)));
-        Self { photons, kd_tree, overlap, longest_reach, floored, capped }
+        let mut ready = vec![MapPhoton::NONE; photons.len()];
+        let fill = |(chunk, places): (usize, &mut [MapPhoton])| {
+            let mut limited = Limited::default();
+            for (i, place) in places.iter_mut().enumerate() {
+                let p = stored(chunk * CHUNK + i);
+                // Made a second time rather than kept: it is larger than the photon.
+                let t = transform(&p);
+                limited.floored += u64::from(t.floored);
+                limited.capped += u64::from(t.capped);
+                limited.longest_reach = limited.longest_reach.max(t.reach);
+                *place = MapPhoton::new(&p, &t);
+            }
+            limited
+        };
+        let limited = ready.par_chunks_mut(CHUNK).enumerate().map(fill).reduce(Limited::default, Limited::and);
+        let kd_tree = parts.kd_tree.then(|| KdTree::new(ready.iter().map(|p| p.position)));
+        let Limited { floored, capped, longest_reach } = limited;
+        Self { photons: ready, kd_tree, overlap, longest_reach, floored, capped }
     }
 
     /// The photons, in the map's order.
@@ -214,12 +262,10 @@ impl PhotonMap {
     /// Nothing is found in a map without footprint hierarchy.
     pub fn overlapping_point(&self, query: &Query, out: &mut Vec<u32>) {
         let Some(tree) = &self.overlap else { return };
-        tree.at_point(query.center, |range| {
-            for i in range {
-                let p = &self.photons[i as usize];
-                if p.to_filter(query.center - p.position).length_squared() < 1.0 && p.lights(query.normal) {
-                    out.push(i);
-                }
+        tree.at_point(query.center, |i| {
+            let p = &self.photons[i as usize];
+            if p.to_filter(query.center - p.position).length_squared() < 1.0 && p.lights(query.normal) {
+                out.push(i);
             }
         });
     }
@@ -230,12 +276,10 @@ impl PhotonMap {
     pub fn overlapping_parallelogram(&self, query: &Query, out: &mut Vec<u32>) {
         let Some(tree) = &self.overlap else { return };
         let [a, b] = query.axes;
-        tree.in_box(query.center, a.abs() + b.abs(), |range| {
-            for i in range {
-                let p = &self.photons[i as usize];
-                if p.lights(query.normal) && meets_unit_ball(p, query) {
-                    out.push(i);
-                }
+        tree.in_box(query.center, a.abs() + b.abs(), |i| {
+            let p = &self.photons[i as usize];
+            if p.lights(query.normal) && meets_unit_ball(p, query) {
+                out.push(i);
             }
         });
     }

@@ -12,4 +12,4 @@ pub mod projection;
 pub mod spread;
 
 pub use map::{MapPhoton, PhotonMap};
-pub use photon::{Photon, PhotonKind, StoredPhotons};
+pub use photon::{Photon, PhotonKind, StoredPhoton, StoredPhotons};

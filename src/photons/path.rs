@@ -159,21 +159,26 @@ impl Flight<'_> {
             let Some(hit) = self.intersector.closest(&ray) else {
                 return Rgb::ZERO;
             };
+            let material = &scene.materials[scene.geometry.material(hit.primitive as usize)];
+            if material.is_diffuse() && !self.keeps(kind) && !self.settings.global {
+                // It ends here, and leaves nothing: half of those that pass a specular surface by.
+                return Rgb::ZERO;
+            }
             let surface = Surface::new(scene, &ray, &hit);
             let v = ray.direction;
             if self.settings.differentials {
                 d = d.transfer(v, surface.normal, hit.t);
                 counts.differentials += u64::from(d.bound(scene.radius, MAX_ANGLE));
             }
-            let x = self.sequence.four(index, 1 + bounce);
+            // Made where they are asked for: a photon that is stored and ends asks for none.
+            let numbers = || self.sequence.four(index, 1 + bounce);
             medium = medium_before(scene, medium, &surface);
             if let Some(inside) = attenuation(scene, medium, hit.t) {
-                match roulette(power, inside, x[1]) {
+                match roulette(power, inside, numbers()[1]) {
                     Some(kept) => power = kept,
                     None => return Rgb::ZERO,
                 }
             }
-            let material = &scene.materials[surface.material as usize];
             recorder.meets(&PhotonMeeting {
                 surface: &surface,
                 direction: v,
@@ -186,17 +191,14 @@ impl Flight<'_> {
                 Material::Emitter { .. } => return Rgb::ZERO,
                 Material::Diffuse { .. } => {
                     if self.keeps(kind) {
-                        out.of_mut(kind).push(Photon {
-                            position: surface.position,
-                            direction: v,
-                            normal: surface.normal,
-                            power,
-                            footprint: d.dp,
-                        });
+                        let (position, normal) = (surface.position, surface.normal);
+                        let photon = Photon { position, direction: v, normal, power, footprint: d.dp };
+                        out.of_mut(kind).push(photon.into());
                     }
                     if !self.settings.global {
                         return Rgb::ZERO;
                     }
+                    let x = numbers();
                     let reflectance = material.diffuse_reflectance(surface.uv);
                     let Some(kept) = roulette(power, reflectance, x[0]) else {
                         return Rgb::ZERO;
@@ -213,7 +215,8 @@ impl Flight<'_> {
                     ray = Ray { origin: surface.leave(scene, w), direction: w };
                 }
                 _ => {
-                    let Some((next, kept, through)) = self.specular(material, &surface, &ray, power, &d, x[0]) else {
+                    let Some((next, kept, through)) = self.specular(material, &surface, &ray, power, &d, numbers()[0])
+                    else {
                         return Rgb::ZERO;
                     };
                     power = kept;

@@ -1,7 +1,7 @@
 //! What depends on what: which photons and images outlive a change of scene or settings.
 
 use crate::estimate::{Estimator, Lookup};
-use crate::photons::Photon;
+use crate::photons::StoredPhoton;
 use crate::photons::path::PathSettings;
 use crate::render::photon_pass::PhotonPass;
 use crate::render::settings::{Gather, RenderSettings};
@@ -101,7 +101,7 @@ impl PhotonStore {
 
 fn bytes(photons: &PhotonPass) -> usize {
     let s = &photons.stored;
-    (s.direct.len() + s.caustic.len() + s.global.len()) * size_of::<Photon>()
+    (s.direct.len() + s.caustic.len() + s.global.len()) * size_of::<StoredPhoton>()
 }
 
 #[cfg(test)]
@@ -121,20 +121,20 @@ mod tests {
 
     fn photons(n: usize) -> Arc<PhotonPass> {
         let mut pass = PhotonPass::default();
-        let photon = Photon {
+        let photon = crate::photons::Photon {
             position: glam::Vec3::ZERO,
             direction: glam::Vec3::X,
             normal: glam::Vec3::Y,
             power: glam::Vec3::ONE,
             footprint: [glam::Vec3::ZERO; 2],
         };
-        pass.stored.caustic = vec![photon; n];
+        pass.stored.caustic = vec![photon.into(); n];
         Arc::new(pass)
     }
 
     #[test]
     fn store_keeps_the_earliest_within_its_budget() {
-        let mut store = PhotonStore::of(10 * size_of::<Photon>());
+        let mut store = PhotonStore::of(10 * size_of::<StoredPhoton>());
         store.put(0, PATH, &photons(4), 0.5);
         store.put(1, PATH, &photons(5), 0.5);
         store.put(2, PATH, &photons(5), 0.5);

@@ -4,8 +4,8 @@
 //! foreseen is left out: photons that one view hit gathers, four bytes each for every thread.
 
 use crate::photons::irradiance::{global_photons, layer};
-use crate::photons::map::{MapParts, PREPARED_BYTES, map_bytes};
-use crate::photons::{Photon, kd_tree};
+use crate::photons::map::{MapParts, BUILT_BYTES, map_bytes};
+use crate::photons::{StoredPhoton, kd_tree};
 use crate::render::error_estimate;
 use crate::render::plan::{Pilot, Plan};
 use crate::render::settings::{RenderSettings, SettingError};
@@ -44,15 +44,15 @@ impl MemoryNeed {
         gathers: bool,
     ) -> Self {
         // While they are traced they are in the parts of the threads and in the whole.
-        let traced = 2 * size_of::<Photon>();
-        let held = size_of::<Photon>();
+        let traced = 2 * size_of::<StoredPhoton>();
+        let held = size_of::<StoredPhoton>();
         Self {
             images: image_bytes(settings.size, estimators),
             photons_stored,
             photons: bytes(photons_stored, traced + held),
             maps: bytes(
                 photons_stored,
-                PREPARED_BYTES + 2 * map_bytes(parts) + if gathers { gather_bytes() } else { 0 },
+                BUILT_BYTES + 2 * map_bytes(parts) + if gathers { gather_bytes() } else { 0 },
             ),
         }
     }

@@ -40,7 +40,7 @@ pub struct Emitter<'a> {
 }
 
 /// The photons of a pass.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub struct PhotonPass {
     /// Stored photons, in the order of emission.
     pub stored: StoredPhotons,
@@ -54,6 +54,21 @@ pub struct PhotonPass {
     pub chunks: Vec<[u32; 3]>,
 }
 
+impl PhotonPass {
+    /// What is in it, in lists that are no longer than they need to be; its own lists stay for the next photons.
+    fn taken(&mut self) -> Self {
+        let taken = Self { chunks: Vec::new(), ..self.clone() };
+        self.clear();
+        taken
+    }
+
+    fn clear(&mut self) {
+        let mut stored = std::mem::take(&mut self.stored);
+        stored.clear();
+        *self = Self { stored, ..Self::default() };
+    }
+}
+
 impl Emitter<'_> {
     /// Traces pass number `pass`. The result does not depend on the number of threads; a cancelled pass is short.
     pub fn run(&self, pass: u64, cancelled: &(dyn Fn() -> bool + Sync)) -> PhotonPass {
@@ -61,10 +76,11 @@ impl Emitter<'_> {
         let parts: Vec<PhotonPass> = departures
             .chunks
             .par_iter()
-            .map(|&chunk| {
-                let mut part = if cancelled() { PhotonPass::default() } else { departures.part(chunk) };
-                part.stored.shrink();
-                part
+            .map_init(PhotonPass::default, |part, &chunk| {
+                if !cancelled() {
+                    departures.part(chunk, part);
+                }
+                part.taken()
             })
             .collect();
         let mut whole = PhotonPass::default();
@@ -72,9 +88,9 @@ impl Emitter<'_> {
             // Once and exactly: a list that grows by doubling may take twice what it holds.
             whole.stored.of_mut(kind).reserve_exact(parts.iter().map(|p| p.stored.of(kind).len()).sum());
         }
-        for mut part in parts {
+        for part in parts {
             whole.chunks.push(PhotonKind::ALL.map(|kind| part.stored.of(kind).len() as u32));
-            whole.stored.append(&mut part.stored);
+            whole.stored.append(part.stored);
             whole.emitted += part.emitted;
             whole.counts += part.counts;
             whole.cut_off += part.cut_off;
@@ -85,13 +101,15 @@ impl Emitter<'_> {
     /// Traces pass number `pass` and keeps nothing of it: photons emitted, and stored of each kind.
     pub fn count(&self, pass: u64) -> (u64, [u64; 3]) {
         let departures = Departures::new(self, pass);
-        let of = |chunk: &Chunk| {
-            let part = departures.part(*chunk);
-            (part.emitted, PhotonKind::ALL.map(|kind| part.stored.of(kind).len() as u64))
+        let of = |part: &mut PhotonPass, chunk: &Chunk| {
+            departures.part(*chunk, part);
+            let counts = (part.emitted, PhotonKind::ALL.map(|kind| part.stored.of(kind).len() as u64));
+            part.clear();
+            counts
         };
         let add = |a: (u64, [u64; 3]), b: (u64, [u64; 3])| (a.0 + b.0, std::array::from_fn(|i| a.1[i] + b.1[i]));
         // Whole numbers: the order of the sum is free.
-        departures.chunks.par_iter().map(of).reduce(Default::default, add)
+        departures.chunks.par_iter().map_init(PhotonPass::default, of).reduce(Default::default, add)
     }
 
     /// Traces one photon of `photons`, which this emitter made as pass `pass`, once more: the one whose path stored
@@ -222,14 +240,12 @@ impl<'a> Departures<'a> {
         chunk.first..(chunk.first + CHUNK).min(self.beams[chunk.beam].share.count)
     }
 
-    /// All photons of a chunk.
-    fn part(&self, chunk: Chunk) -> PhotonPass {
-        let mut part = PhotonPass::default();
+    /// Adds all photons of a chunk to `part`.
+    fn part(&self, chunk: Chunk, part: &mut PhotonPass) {
         let flight = self.flight(chunk);
         for number in self.numbers(chunk) {
-            self.send(&flight, chunk, number, &mut part, &mut Unrecorded);
+            self.send(&flight, chunk, number, part, &mut Unrecorded);
         }
-        part
     }
 
     /// Sends one photon off and follows it.

@@ -128,6 +128,7 @@ fn render(scene: Scene) -> Result<(), String> {
     let pass = renderer.last_pass().expect("two were made");
     for kind in PhotonKind::ALL {
         for p in pass.photons.stored.of(kind) {
+            let p = cusp::photons::Photon::from(*p);
             let vectors = [p.position, p.direction, p.normal, p.power, p.footprint[0], p.footprint[1]];
             assert!(vectors.iter().all(|v| v.is_finite()), "{p:?}");
         }

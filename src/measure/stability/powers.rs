@@ -5,7 +5,7 @@ use super::setup::{ALL, BEAM, built_in, finite_films, outcome, rendered, scene};
 use super::{Case, Outcome};
 use crate::math::rgb::Rgb;
 use crate::math::sequence::{Sampling, Sequence};
-use crate::photons::Photon;
+use crate::photons::StoredPhoton;
 use crate::photons::emission::share_photons;
 use crate::render::settings::{DirectLight, LightPart, PlanMode};
 use crate::scene::{Light, Material, Scene};
@@ -236,7 +236,7 @@ fn white_box() -> Outcome {
             })?;
             finite_films(&r, out);
             let Some(pass) = r.last_pass() else { return Err("no pass".into()) };
-            let power = |photons: &[Photon]| photons.iter().map(|p| f64::from(p.power.x)).sum::<f64>();
+            let power = |photons: &[StoredPhoton]| photons.iter().map(|p| f64::from(p.power.x)).sum::<f64>();
             let at = |what: &str, found: f64, exact: f64| format!("bounce limit {depth}, {what}: {found} for {exact}");
             let stored = &pass.photons.stored;
             let bounces = f64::from(depth - 1);

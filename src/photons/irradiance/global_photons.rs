@@ -3,7 +3,7 @@
 use crate::math::rgb::Rgb;
 use crate::photons::irradiance::agree;
 use crate::photons::kd_tree::{KdTree, Nearest, NearestQuery};
-use crate::photons::{Photon, PhotonKind, StoredPhotons};
+use crate::photons::{Photon, PhotonKind, StoredPhoton, StoredPhotons};
 use glam::{DVec3, Vec3};
 use std::f64::consts::PI;
 
@@ -28,7 +28,7 @@ pub struct GlobalPhotons {
 impl GlobalPhotons {
     /// Those of the given kinds.
     pub fn new(stored: &StoredPhotons, kinds: &[PhotonKind]) -> Self {
-        let all: Vec<&[Photon]> = kinds.iter().map(|&kind| stored.of(kind)).collect();
+        let all: Vec<&[StoredPhoton]> = kinds.iter().map(|&kind| stored.of(kind)).collect();
         let each = || all.iter().flat_map(|photons| photons.iter());
         let tree = KdTree::with_small_leaves(each().map(|p| p.position));
         let mut starts = Vec::with_capacity(all.len());
@@ -43,7 +43,7 @@ impl GlobalPhotons {
             .map(|&i| {
                 // The last list that starts at or before the photon.
                 let list = starts.partition_point(|&s| s <= i as usize) - 1;
-                let p = &all[list][i as usize - starts[list]];
+                let p = Photon::from(all[list][i as usize - starts[list]]);
                 GlobalPhoton { position: p.position, normal: p.normal, power: p.power }
             })
             .collect();

@@ -25,10 +25,11 @@ impl<'a> SurfaceAreas<'a> {
         let g = &scene.geometry;
         let diffuse: Vec<u32> =
             (0..g.primitive_count() as u32).filter(|&i| scene.materials[g.material(i as usize)].is_diffuse()).collect();
-        let tree = OverlapTree::new(diffuse.iter().map(|&i| {
+        let bounds = |&i: &u32| {
             let (low, high) = g.bounds(i as usize);
             ((low + high) / 2.0, (high - low) / 2.0)
-        }));
+        };
+        let tree = OverlapTree::new(&diffuse.iter().map(bounds).collect::<Vec<_>>());
         let primitives = tree.order().iter().map(|&i| diffuse[i as usize]).collect();
         Self { scene, tree, primitives }
     }
@@ -64,33 +65,31 @@ impl<'a> SurfaceAreas<'a> {
         let mut own = (f64::INFINITY, 1.0);
         let mut others: Vec<(f64, f64)> = Vec::new();
         let mut area = 0.0;
-        self.tree.in_box(position, Vec3::splat(radius), |range| {
-            for &i in &self.primitives[range.start as usize..range.end as usize] {
-                if let Some(s) = g.spheres.get((i as usize).wrapping_sub(g.triangles.len())) {
-                    let part = cap(s.center.as_dvec3(), f64::from(s.radius), center, n, r);
-                    area += part;
-                    continue;
-                }
-                let corners = g.corners(i as usize);
-                let front = flat_normal(corners);
-                let facing = front.dot(n);
-                if facing.abs() < agreement {
-                    continue;
-                }
-                let [a, b, c] = corners.map(|v| v.as_dvec3());
-                let distance = front.dot(center - a);
-                let part = triangle_in_ball([a, b, c], front, center, r);
-                if part <= 0.0 {
-                    continue;
-                }
-                if distance.abs() < own.0 {
-                    own = (distance.abs(), facing.signum());
-                }
-                if distance.abs() <= IN_PLANE * r {
-                    area += part;
-                } else {
-                    others.push((facing, part));
-                }
+        self.tree.in_box(position, Vec3::splat(radius), |entry| {
+            let i = self.primitives[entry as usize];
+            if let Some(s) = g.spheres.get((i as usize).wrapping_sub(g.triangles.len())) {
+                area += cap(s.center.as_dvec3(), f64::from(s.radius), center, n, r);
+                return;
+            }
+            let corners = g.corners(i as usize);
+            let front = flat_normal(corners);
+            let facing = front.dot(n);
+            if facing.abs() < agreement {
+                return;
+            }
+            let [a, b, c] = corners.map(|v| v.as_dvec3());
+            let distance = front.dot(center - a);
+            let part = triangle_in_ball([a, b, c], front, center, r);
+            if part <= 0.0 {
+                return;
+            }
+            if distance.abs() < own.0 {
+                own = (distance.abs(), facing.signum());
+            }
+            if distance.abs() <= IN_PLANE * r {
+                area += part;
+            } else {
+                others.push((facing, part));
             }
         });
         area + others.iter().filter(|(facing, _)| facing * own.1 > 0.0).map(|(_, part)| part).sum::<f64>()

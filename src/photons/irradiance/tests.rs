@@ -6,7 +6,7 @@ use crate::math::sequence::Sampling;
 use crate::math::sequence::Sequence;
 use crate::photons::kd_tree::Nearest;
 use crate::photons::path::{Flight, PathCounts, PathSettings, Unrecorded};
-use crate::photons::{Photon, PhotonKind, StoredPhotons, emission};
+use crate::photons::{Photon, PhotonKind, StoredPhoton, StoredPhotons, emission};
 use crate::scene::{Scene, open};
 use crate::trace::Intersector;
 use glam::DVec3;
@@ -172,7 +172,7 @@ fn even_light_is_even_to_the_edges() {
             footprint: [Vec3::ZERO; 2],
         }
     };
-    let stored = StoredPhotons { direct: (0..n * n).map(photon).collect(), ..Default::default() };
+    let stored = StoredPhotons { direct: (0..n * n).map(|i| photon(i).into()).collect(), ..Default::default() };
     let photons = GlobalPhotons::new(&stored, &PhotonKind::ALL);
     let radius = size.x / 25.0;
     for layer in pyramid(&scene, &photons, &settings(radius, false)).layers() {
@@ -223,7 +223,9 @@ fn odd_rooms_have_a_pyramid() {
     let scene = open("two_lights").expect("built in");
     let stored = traced(&scene, 400);
     let one = stored.global[0];
-    let triangle: Vec<Photon> = stored.direct.iter().filter(|p| p.normal == stored.direct[0].normal).copied().collect();
+    let normal = |p: StoredPhoton| Photon::from(p).normal;
+    let first = normal(stored.direct[0]);
+    let triangle: Vec<StoredPhoton> = stored.direct.iter().filter(|p| normal(**p) == first).copied().collect();
     let sets = [vec![], vec![one], vec![one; 500], triangle, stored.global];
     for global in sets {
         let count = global.len();

@@ -3,7 +3,7 @@
 /// The cells of one light from which photons may meet a specular surface.
 #[derive(Clone, Debug)]
 pub struct Cells {
-    /// Cells along each of the four numbers.
+    /// Cells along each of the four numbers, powers of two.
     counts: [u32; 4],
     /// The marked ones, the last number fastest; None if all are.
     marked: Option<Vec<u32>>,
@@ -41,12 +41,13 @@ impl Cells {
         let mut cell = marked[chosen];
         let mut place = [0; 4];
         for (place, count) in place.iter_mut().zip(self.counts).rev() {
-            *place = cell % count;
-            cell /= count;
+            *place = cell & (count - 1);
+            cell >>= count.trailing_zeros();
         }
         let within = [at - chosen as f64, f64::from(x[1]), f64::from(x[2]), f64::from(x[3])];
         std::array::from_fn(|i| {
-            let y = ((f64::from(place[i]) + within[i]) / f64::from(self.counts[i])) as f32;
+            // Over a power of two: exact, and a multiplication.
+            let y = ((f64::from(place[i]) + within[i]) * (1.0 / f64::from(self.counts[i]))) as f32;
             // Rounding may reach 1, which no number in [0, 1) does.
             y.min(1.0 - f32::EPSILON / 2.0)
         })

@@ -1,0 +1,149 @@
+//! Gathering by footprint: every photon whose box meets a point or a box.
+//!
+//! The boxes are sorted along a curve that keeps neighbours together, those of like size with each other, and then packed
+//! by eights from below: eight boxes are a block, eight blocks make the box of a block above, and so on (Kamel and
+//! Faloutsos 1993). There are no pointers, the tree is as full as can be, and the eight boxes of a block are tested at
+//! once, in the widest instructions that the processor has.
+
+mod curve;
+mod walk;
+
+use curve::Curve;
+use glam::Vec3;
+use pulp::Arch;
+use rayon::prelude::*;
+use walk::Walk;
+
+/// Boxes that are tested at once.
+const LANES: usize = 8;
+
+/// Memory of one entry: its box, its share of the boxes above, and its place in the order.
+pub const BYTES_PER_ENTRY: usize = 28 + size_of::<u32>();
+
+/// Memory of one entry while the tree is built, beside that of the tree: its box, and its key with its number.
+pub const BYTES_PER_BUILT_ENTRY: usize = size_of::<Bounds>() + size_of::<(u64, u32)>();
+
+/// Centre and half-size.
+type Bounds = (Vec3, Vec3);
+
+/// Eight boxes: their least and largest coordinates along each axis. An empty one is met by nothing.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(64))]
+struct Block {
+    low: [[f32; LANES]; 3],
+    high: [[f32; LANES]; 3],
+}
+
+impl Block {
+    const EMPTY: Self = Self { low: [[f32::INFINITY; LANES]; 3], high: [[f32::NEG_INFINITY; LANES]; 3] };
+
+    fn put(&mut self, lane: usize, low: Vec3, high: Vec3) {
+        for axis in 0..3 {
+            self.low[axis][lane] = low[axis];
+            self.high[axis][lane] = high[axis];
+        }
+    }
+
+    /// Corners of the box around all of them.
+    fn around(&self) -> (Vec3, Vec3) {
+        let least = |lanes: &[f32; LANES]| lanes.iter().fold(f32::INFINITY, |m, v| m.min(*v));
+        let largest = |lanes: &[f32; LANES]| lanes.iter().fold(f32::NEG_INFINITY, |m, v| m.max(*v));
+        (Vec3::from_array(std::array::from_fn(|i| least(&self.low[i]))),
+         Vec3::from_array(std::array::from_fn(|i| largest(&self.high[i]))))
+    }
+}
+
+/// A hierarchy over the boxes of photon footprints. It answers with candidates whose boxes meet the query.
+#[derive(Default)]
+pub struct OverlapTree {
+    /// Blocks of all levels, the entries' own first.
+    blocks: Vec<Block>,
+    /// The first block of each level.
+    levels: Vec<u32>,
+    /// For each entry the box that it is.
+    order: Vec<u32>,
+}
+
+impl OverlapTree {
+    /// Builds over boxes given as centre and half-size.
+    pub fn new(boxes: &[(Vec3, Vec3)]) -> Self {
+        if boxes.is_empty() {
+            return Self::default();
+        }
+        let curve = Curve::around(boxes);
+        let mut keys: Vec<(u64, u32)> =
+            boxes.par_iter().zip(0..boxes.len() as u32).map(|(b, i)| (curve.key(b), i)).collect();
+        keys.par_sort_unstable();
+        let order: Vec<u32> = keys.par_iter().map(|&(_, i)| i).collect();
+        drop(keys);
+        let counts: Vec<usize> = std::iter::successors(Some(order.len().div_ceil(LANES)), |n| {
+            (*n > 1).then(|| n.div_ceil(LANES))
+        })
+        .collect();
+        let mut blocks = Vec::with_capacity(counts.iter().sum());
+        order
+            .par_chunks(LANES)
+            .map(|entries| {
+                let mut block = Block::EMPTY;
+                for (lane, &i) in entries.iter().enumerate() {
+                    let (low, high) = corners(boxes[i as usize]);
+                    block.put(lane, low, high);
+                }
+                block
+            })
+            .collect_into_vec(&mut blocks);
+        let mut levels = vec![0];
+        while blocks.len() - levels[levels.len() - 1] as usize > 1 {
+            let below = levels[levels.len() - 1] as usize;
+            let next: Vec<Block> = blocks[below..]
+                .par_chunks(LANES)
+                .map(|children| {
+                    let mut block = Block::EMPTY;
+                    for (lane, child) in children.iter().enumerate() {
+                        let (low, high) = child.around();
+                        block.put(lane, low, high);
+                    }
+                    block
+                })
+                .collect();
+            levels.push(blocks.len() as u32);
+            blocks.extend(next);
+        }
+        Self { blocks, levels, order }
+    }
+
+    /// For each entry, as they are reported, the box that it is.
+    pub fn order(&self) -> &[u32] {
+        &self.order
+    }
+
+    /// Calls `visit` with the entries whose box holds the point, in their order.
+    #[inline]
+    pub fn at_point(&self, point: Vec3, visit: impl FnMut(u32)) {
+        self.between(point, point, visit);
+    }
+
+    /// Calls `visit` with the entries whose box meets the box of that centre and half-size, in their order.
+    #[inline]
+    pub fn in_box(&self, center: Vec3, half: Vec3, visit: impl FnMut(u32)) {
+        let (low, high) = corners((center, half));
+        self.between(low, high, visit);
+    }
+
+    #[inline]
+    fn between(&self, low: Vec3, high: Vec3, visit: impl FnMut(u32)) {
+        if !self.levels.is_empty() {
+            Arch::new().dispatch(Walk { tree: self, low, high, visit });
+        }
+    }
+}
+
+/// Corners of a box, one unit in the last place out on each side: so it keeps what it holds.
+#[inline]
+fn corners((center, half): Bounds) -> (Vec3, Vec3) {
+    let half = half * (1.0 + 4.0 * f32::EPSILON) + center.abs() * f32::EPSILON;
+    (center - half, center + half)
+}
+
+#[cfg(test)]
+mod tests;
