@@ -21,6 +21,7 @@ use crate::measure::metrics::{Mask, compare};
 use crate::measure::truth::{TRUTH_RAYS, truth};
 use crate::measure::window::{busiest_window, contours, disagreement};
 use crate::render::Step;
+use crate::render::evidence::Evidence;
 use crate::render::film::{Image, Rect};
 use crate::render::memory::check_images;
 use crate::render::photon_pass::PhotonMaps;
@@ -307,7 +308,8 @@ impl<'a> Comparison<'a> {
         let mut settings = r.settings().clone();
         settings.plan = PlanMode::Full;
         let slots = crate::render::renderer::slots(r.estimators(), settings.gather);
-        let full = Plan::new(r.scene(), &settings, &slots, None);
+        let evidence = Evidence { pilot: None, projection: r.plan().projection.clone() };
+        let full = Plan::new(r.scene(), &settings, &slots, &evidence);
         let timed = |plan: &Plan| {
             let start = Instant::now();
             let photons = if plan.needs_photons() {

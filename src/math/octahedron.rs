@@ -4,7 +4,8 @@ use glam::Vec3;
 
 /// A unit vector on the octahedron, unfolded to a square of 65,535 points a side (Cigolle et al. 2014).
 ///
-/// Off by 4e-5 radians at most; the six directions along the axes are exact.
+/// Off by 6.5e-5 radians at most, which is half a step along both sides where the octahedron is nearest to the sphere's
+/// centre; the six directions along the axes are exact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Octahedral([i16; 2]);
 
@@ -48,7 +49,7 @@ mod tests {
             let v = v.normalize();
             let back = Octahedral::new(v).direction();
             prop_assert!(back.is_normalized());
-            prop_assert!(back.as_dvec3().angle_between(v.as_dvec3()) < 4e-5, "{v} {back}");
+            prop_assert!(back.as_dvec3().angle_between(v.as_dvec3()) < 6.5e-5, "{v} {back}");
             // What came back once stays.
             let again = Octahedral::new(back).direction();
             prop_assert!((again - back).length() < 1e-6, "{back} {again}");

@@ -33,12 +33,7 @@ pub fn share_photons(scene: &Scene, total: u64, sequence: &Sequence) -> Vec<Ligh
 }
 
 /// The same among parts of the lights: `part` tells what share of its power each sends out, in `[0, 1]`.
-pub fn share_among(
-    scene: &Scene,
-    total: u64,
-    sequence: &Sequence,
-    part: impl Fn(usize) -> f64,
-) -> Vec<LightShare> {
+pub fn share_among(scene: &Scene, total: u64, sequence: &Sequence, part: impl Fn(usize) -> f64) -> Vec<LightShare> {
     let flux: f64 = scene.lights.iter().enumerate().map(|(i, l)| f64::from(mean(l.flux())) * part(i)).sum();
     let mut shares = Vec::new();
     for (light, l) in scene.lights.iter().enumerate() {
@@ -93,8 +88,7 @@ pub fn emit(scene: &Scene, light: &Light, count: f64, x: [f32; 4]) -> Emission {
             bounded,
         }
     };
-    let from_surface =
-        |position: Vec3, normal: Vec3| leaves(position, normal, cosine_hemisphere(normal, x[2], x[3]));
+    let from_surface = |position: Vec3, normal: Vec3| leaves(position, normal, cosine_hemisphere(normal, x[2], x[3]));
     match light {
         Light::Point { position, .. } => from_point(*position, uniform_sphere(x[0], x[1]).normalize(), 4.0 * PI / n),
         Light::Spot { position, direction: axis, cos_half, falloff, .. } => {
@@ -278,9 +272,10 @@ mod tests {
                 power: Rgb::ONE,
             };
             let scene = plane_with(vec![light.clone()]);
-            let mean: f64 =
-                (0..n).map(|i| f64::from(-emit(&scene, &light, n as f64, sequence.four(i, 0)).direction.y)).sum::<f64>()
-                    / n as f64;
+            let mean: f64 = (0..n)
+                .map(|i| f64::from(-emit(&scene, &light, n as f64, sequence.four(i, 0)).direction.y))
+                .sum::<f64>()
+                / n as f64;
             let c = f64::from(half.cos());
             let m = f64::from(falloff);
             let expected = (1.0 - c.powf(m + 2.0)) / (m + 2.0) * (m + 1.0) / (1.0 - c.powf(m + 1.0));

@@ -92,6 +92,11 @@ impl PhotonStore {
         }
     }
 
+    /// Whether it keeps any.
+    pub fn is_used(&self) -> bool {
+        self.budget > 0
+    }
+
     /// Forgets all.
     pub fn clear(&mut self) {
         self.used = 0;

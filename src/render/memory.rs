@@ -4,10 +4,11 @@
 //! foreseen is left out: photons that one view hit gathers, four bytes each for every thread.
 
 use crate::photons::irradiance::{global_photons, layer};
-use crate::photons::map::{MapParts, BUILT_BYTES, map_bytes};
+use crate::photons::map::{BUILT_BYTES, MapParts, map_bytes};
 use crate::photons::{StoredPhoton, kd_tree};
 use crate::render::error_estimate;
-use crate::render::plan::{Pilot, Plan};
+use crate::render::evidence::Pilot;
+use crate::render::plan::Plan;
 use crate::render::settings::{RenderSettings, SettingError};
 use crate::scene::Scene;
 use crate::scene::memory::{Shortage, bytes, check};
@@ -22,9 +23,9 @@ pub struct MemoryNeed {
     pub images: u64,
     /// Photons that a pass is expected to store.
     pub photons_stored: u64,
-    /// These photons, and those of the pass before, which is kept until the next is done.
+    /// These photons, and those of the pass before where it is kept until the next is done.
     pub photons: u64,
-    /// Their maps and what building them takes, and the maps of the pass before.
+    /// Their maps and what building them takes, and the maps of the pass before where it is kept.
     pub maps: u64,
 }
 
@@ -35,25 +36,23 @@ impl MemoryNeed {
     }
 
     /// That of a render of `estimators` images, of which each pass stores so many photons in maps with those `parts`, and
-    /// again in the structures of final gathering if it `gathers`.
+    /// again in the structures of final gathering if it `gathers`. `passes` are held at once.
     pub fn new(
         settings: &RenderSettings,
         estimators: usize,
         photons_stored: u64,
         parts: MapParts,
         gathers: bool,
+        passes: usize,
     ) -> Self {
-        // While they are traced they are in the parts of the threads and in the whole.
-        let traced = 2 * size_of::<StoredPhoton>();
-        let held = size_of::<StoredPhoton>();
+        // While they are traced they are in the parts of the threads and in the whole, but there are no maps yet, which
+        // take more than that.
+        let gathering = if gathers { gather_bytes() } else { 0 };
         Self {
             images: image_bytes(settings.size, estimators),
             photons_stored,
-            photons: bytes(photons_stored, traced + held),
-            maps: bytes(
-                photons_stored,
-                BUILT_BYTES + 2 * map_bytes(parts) + if gathers { gather_bytes() } else { 0 },
-            ),
+            photons: bytes(photons_stored, passes * size_of::<StoredPhoton>()),
+            maps: bytes(photons_stored, BUILT_BYTES + passes * map_bytes(parts) + gathering),
         }
     }
 
@@ -108,7 +107,7 @@ pub fn check_images(settings: &RenderSettings, estimators: usize) -> Result<(), 
         .map_err(|short| SettingError { place: "size".into(), what: short.to_string() })
 }
 
-/// What a pass is expected to need. Without a pilot it takes the most that a pass can store, and sends one where that
+/// What a pass is expected to need where `passes` are held at once. Without a pilot it takes the most that a pass can store, and sends one where that
 /// would not fit.
 pub fn foreseen(
     scene: &Scene,
@@ -117,8 +116,9 @@ pub fn foreseen(
     plan: &Plan,
     pilot: Option<&Pilot>,
     estimators: usize,
+    passes: usize,
 ) -> MemoryNeed {
-    let need = |stored| MemoryNeed::new(settings, estimators, stored, plan.map_parts(), plan.gathers());
+    let need = |stored| MemoryNeed::new(settings, estimators, stored, plan.map_parts(), plan.gathers(), passes);
     let most = need(most_stored(settings, plan));
     let likely = |pilot: &Pilot| need(likely_stored(settings, plan, pilot).min(most.photons_stored));
     match pilot {
@@ -131,12 +131,16 @@ pub fn foreseen(
 /// Most photons that a pass can store, whatever the scene: one for each surface that a path may meet.
 fn most_stored(settings: &RenderSettings, plan: &Plan) -> u64 {
     let each = if plan.bounces() { u64::from(settings.max_depth) } else { u64::from(plan.needs_photons()) };
-    settings.photons.saturating_mul(each)
+    // Those for the caustic map are others than those for the rest.
+    let caustic = u64::from(plan.projection.is_some() && (plan.bounces() || plan.direct_map));
+    settings.photons.saturating_mul(each + caustic)
 }
 
 /// Photons that a pass is expected to store, by what the pilot's did.
 fn likely_stored(settings: &RenderSettings, plan: &Plan, pilot: &Pilot) -> u64 {
     let [caustic, global] = pilot.stored_per_photon();
+    // Of the photons that leave through marked cells so many more become caustic.
+    let caustic = plan.projection.as_ref().map_or(caustic, |map| (caustic / map.share()).min(1.0));
     let each = f64::from(u8::from(plan.direct_map || plan.gathers()))
         + if plan.caustic_map || plan.gathers() { caustic } else { 0.0 }
         + if plan.bounces() { global } else { 0.0 };
@@ -182,7 +186,7 @@ mod tests {
         assert!(why.starts_with("size: 100000 images of 8192x8192 pixels would need ") && !why.contains('\n'), "{why}");
         // Numbers beyond 64 bits saturate.
         settings.photons = u64::MAX;
-        let need = MemoryNeed::new(&settings, usize::MAX, u64::MAX, MapParts { kd_tree: true, overlap: true }, true);
+        let need = MemoryNeed::new(&settings, usize::MAX, u64::MAX, MapParts { kd_tree: true, overlap: true }, true, 2);
         assert_eq!(need.total(), u64::MAX);
     }
 }

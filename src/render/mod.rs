@@ -2,6 +2,7 @@
 
 pub mod change;
 pub mod error_estimate;
+pub mod evidence;
 pub mod film;
 pub mod flat_pixels;
 pub mod heatmap;

@@ -2,10 +2,11 @@
 
 use crate::estimate::Estimator;
 use crate::final_gather::GatherMaps;
+use crate::render::evidence::Evidence;
 use crate::render::flat_pixels::FlatPixels;
 use crate::render::memory::foreseen;
 use crate::render::photon_pass::{Emitter, PhotonMaps, PhotonPass};
-use crate::render::plan::{Pilot, Plan, Slot};
+use crate::render::plan::{Plan, Slot};
 use crate::render::renderer::{area_factor, slots};
 use crate::render::settings::RenderSettings;
 use crate::render::tiles::TILE;
@@ -71,9 +72,9 @@ impl Pass {
         cancelled: &(dyn Fn() -> bool + Sync),
     ) -> Result<Option<Self>, Shortage> {
         let intersector = Arc::new(Intersector::new(&scene.geometry, scene.radius));
-        let pilot = Pilot::needed(&scene, &settings).then(|| Pilot::send(&scene, &intersector, &settings));
-        let plan = Plan::new(&scene, &settings, slots, pilot.as_ref());
-        foreseen(&scene, &intersector, &settings, &plan, pilot.as_ref(), 1).check(&settings)?;
+        let evidence = Evidence::of(&scene, &intersector, &settings, Evidence::default());
+        let plan = Plan::new(&scene, &settings, slots, &evidence);
+        foreseen(&scene, &intersector, &settings, &plan, evidence.pilot.as_ref(), 1, 1).check(&settings)?;
         let area_factor = area_factor(number);
         let (photons, maps, gathering) = (Arc::default(), PhotonMaps::default(), GatherMaps::default());
         let flat = needs_flat_pixels(slots.iter().map(|s| s.estimator), &plan, number)

@@ -90,7 +90,7 @@ impl Emitter<'_> {
         }
         for part in parts {
             whole.chunks.push(PhotonKind::ALL.map(|kind| part.stored.of(kind).len() as u32));
-            whole.stored.append(part.stored);
+            whole.stored.append(&part.stored);
             whole.emitted += part.emitted;
             whole.counts += part.counts;
             whole.cut_off += part.cut_off;
@@ -200,21 +200,24 @@ impl<'a> Departures<'a> {
         let seed = mix(mix(emitter.seed, 0x70_686f_746f_6e73), pass);
         let projection = projection.filter(|_| path.projected && path.caustic);
         let others = path.direct || path.global;
-        // Half of them each, where other maps want photons too.
-        let aimed = if others { photons - photons / 2 } else { photons };
         let mut beams = Vec::new();
         if let Some(map) = projection {
-            let seed = mix(seed, 0x6361_7573_7469_63);
+            let seed = mix(seed, 0x0063_6175_7374_6963);
             let random = Sequence::new(Sampling::Random, seed);
             let path = PathSettings { direct: false, global: false, ..path };
-            for share in share_among(scene, aimed, &random, |light| map.light(light).share()) {
+            for share in share_among(scene, photons, &random, |light| map.light(light).share()) {
                 let cells = map.light(share.light);
                 let sequence = Sequence::new(sampling, mix(seed, share.light as u64));
-                beams.push(Beam { share, whole: share.count as f64 / cells.share(), cells: Some(cells), path, sequence });
+                beams.push(Beam {
+                    share,
+                    whole: share.count as f64 / cells.share(),
+                    cells: Some(cells),
+                    path,
+                    sequence,
+                });
             }
         }
         if projection.is_none() || others {
-            let photons = if projection.is_some() { photons - aimed } else { photons };
             let path = PathSettings { caustic: path.caustic && projection.is_none(), ..path };
             for share in share_photons(scene, photons, &Sequence::new(Sampling::Random, seed)) {
                 let sequence = Sequence::new(sampling, mix(seed, share.light as u64));

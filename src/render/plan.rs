@@ -5,18 +5,14 @@ use crate::estimate::{Estimator, FinalGatherMethod, FinalGathering, Lookup};
 use crate::photons::map::MapParts;
 use crate::photons::path::PathSettings;
 use crate::photons::projection::ProjectionMap;
-use crate::render::photon_pass::{self, Emitter};
+use crate::render::evidence::Evidence;
 use crate::render::settings::{DirectLight, Gather, LightPart, PlanMode, Projection, RenderSettings};
 use crate::scene::{Light, Scene};
-use crate::trace::Intersector;
 use serde::Serialize;
 use std::sync::Arc;
 
 /// Share of the lights' power towards specular surfaces from which on a projection map is not worth having.
 pub const WORTHWHILE_SHARE: f64 = 0.5;
-
-/// Photons that the plan sends ahead to see where light goes.
-pub const PILOT_PHOTONS: u64 = 65_536;
 
 /// One part of a render.
 #[derive(Clone, Debug, Serialize)]
@@ -76,8 +72,9 @@ impl<'a> Slot<'a> {
 }
 
 impl Plan {
-    /// Plans for a scene and estimators, on the evidence of a pilot where [`Pilot::needed`] says so.
-    pub fn new(scene: &Scene, settings: &RenderSettings, slots: &[Slot], pilot: Option<&Pilot>) -> Self {
+    /// Plans for a scene and estimators on the evidence that there is.
+    pub fn new(scene: &Scene, settings: &RenderSettings, slots: &[Slot], evidence: &Evidence) -> Self {
+        let pilot = evidence.pilot.as_ref();
         let full = settings.plan == PlanMode::Full;
         let shows = |part| settings.light == LightPart::All || settings.light == part;
         let lit = scene.total_flux() > 0.0;
@@ -100,7 +97,7 @@ impl Plan {
             };
             item("caustic map", on, why)
         };
-        let (global_light, evidence) = match pilot {
+        let (global_light, why_global) = match pilot {
             _ if !shows(LightPart::Global) => (false, "this light is not asked for".into()),
             _ if full => (true, "forced on".into()),
             None => (false, "no light has power".into()),
@@ -111,7 +108,7 @@ impl Plan {
         let global_map = item(
             "global map",
             global_light && by_photons,
-            if global_light && !by_photons { "final gathering takes its place".into() } else { evidence.clone() },
+            if global_light && !by_photons { "final gathering takes its place".into() } else { why_global.clone() },
         );
         let final_gatherings = if global_light { asked.clone() } else { Vec::new() };
         let gathers = item(
@@ -119,7 +116,7 @@ impl Plan {
             !final_gatherings.is_empty(),
             match (asked.is_empty(), global_light) {
                 (true, _) => "not asked for".into(),
-                (false, false) => format!("there is nothing to gather: {evidence}"),
+                (false, false) => format!("there is nothing to gather: {why_global}"),
                 (false, true) => asked.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "),
             },
         );
@@ -142,20 +139,21 @@ impl Plan {
                 _ => "there is no global map".into(),
             },
         );
-        let projection = pilot.and_then(|p| p.projection.clone()).filter(|p| {
+        let projection = evidence.projection.as_ref().filter(|p| {
             let pays = p.share() < WORTHWHILE_SHARE && !gathers;
-            caustic_map && pays && !full && settings.projection_map == Projection::Auto
+            caustic_map && pays && settings.projection_map == Projection::Auto
         });
-        let share = pilot.and_then(|p| p.projection.as_ref()).map_or(0.0, |p| 100.0 * p.share());
         item(
             "projection map",
             projection.is_some(),
-            match settings.projection_map {
+            match (settings.projection_map, &evidence.projection) {
                 _ if !caustic_map => "there is no caustic map".into(),
-                Projection::Off => "turned off".into(),
-                Projection::Auto if full => "it would leave photons out".into(),
-                Projection::Auto if gathers => "final gathering looks up photons of equal power".into(),
-                Projection::Auto => format!("{share:.3} % of the lights' power leaves towards specular surfaces"),
+                (Projection::Off, _) => "turned off".into(),
+                _ if gathers => "final gathering looks up photons of equal power".into(),
+                (_, None) => "it has not been made".into(),
+                (_, Some(p)) => {
+                    format!("{:.3} % of the lights' power leaves towards specular surfaces", 100.0 * p.share())
+                }
             },
         );
         let only_caustic = caustic_map && !global_map && !direct_by_photons && !gathers;
@@ -165,7 +163,7 @@ impl Plan {
             match (only_caustic, projection.is_some()) {
                 (true, true) => "they are not emitted".into(),
                 (true, false) => "they cannot become caustic".into(),
-                (false, true) => "half of the photons, for the other maps".into(),
+                (false, true) => "as many photons again, for the other maps".into(),
                 (false, false) => "followed with the others, if any".into(),
             },
         );
@@ -258,7 +256,7 @@ impl Plan {
             direct_map,
             caustic_map,
             global_map,
-            projection,
+            projection: projection.map(Arc::clone),
             final_gatherings,
             shadow_rays,
             emission,
@@ -340,55 +338,4 @@ fn gatherings(slots: &[Slot]) -> Vec<FinalGathering> {
         }
     }
     all
-}
-
-/// Photons sent ahead of a render, to see where light goes, and where it may meet specular surfaces.
-#[derive(Clone, Debug)]
-pub struct Pilot {
-    emitted: u64,
-    caustic: u64,
-    global: u64,
-    projection: Option<Arc<ProjectionMap>>,
-}
-
-impl Pilot {
-    /// Whether a plan asks for one: light may take more than one way, and not every part is forced on.
-    pub fn needed(scene: &Scene, settings: &RenderSettings) -> bool {
-        settings.plan == PlanMode::Needed && settings.light != LightPart::Direct && scene.total_flux() > 0.0
-    }
-
-    /// Sends [`PILOT_PHOTONS`], which carry no differentials.
-    pub fn send(scene: &Scene, intersector: &Intersector, settings: &RenderSettings) -> Self {
-        let path = PathSettings {
-            max_depth: settings.max_depth,
-            direct: false,
-            caustic: true,
-            global: true,
-            projected: false,
-            differentials: false,
-            spread: settings.diffuse_spread,
-        };
-        let (sampling, seed) = (settings.sampling, settings.seed);
-        let photons = PILOT_PHOTONS;
-        let emitter = Emitter { scene, intersector, path, projection: None, sampling, photons, seed };
-        let (emitted, [_, caustic, global]) = emitter.count(photon_pass::PILOT_PASS);
-        Self { emitted, caustic, global, projection: ProjectionMap::new(scene).map(Arc::new) }
-    }
-
-    /// Caustic and global photons that were stored for each that was emitted. Where none was, as many as the rule of
-    /// three allows.
-    pub fn stored_per_photon(&self) -> [f64; 2] {
-        [self.caustic, self.global].map(|stored| stored.max(3) as f64 / self.emitted.max(1) as f64)
-    }
-
-    fn verdict(&self, count: u64, what: &str) -> (bool, String) {
-        let n = self.emitted;
-        if count > 0 {
-            (true, format!("of {n} pilot photons {count} {what}"))
-        } else {
-            // The rule of three: none in n tries bounds the rate by 3/n at 95 % confidence.
-            let bound = 100.0 * 3.0 / n as f64;
-            (false, format!("of {n} pilot photons none {what} (below {bound:.3} % with 95 % confidence)"))
-        }
-    }
 }

@@ -4,12 +4,13 @@ use crate::estimate::{Estimator, Lookup};
 use crate::final_gather::GatherCounts;
 use crate::render::change::{PhotonStore, World, film_is_kept, photons_are_kept};
 use crate::render::error_estimate::ErrorEstimate;
+use crate::render::evidence::Evidence;
 use crate::render::film::{Film, Rect};
 use crate::render::flat_pixels::FlatPixels;
 use crate::render::memory::{MemoryNeed, foreseen};
 use crate::render::pass::{Pass, gather_maps, needs_flat_pixels, scale_of};
 use crate::render::photon_pass::{Emitter, PhotonMaps, PhotonPass};
-use crate::render::plan::{Pilot, Plan, Slot};
+use crate::render::plan::{Plan, Slot};
 use crate::render::settings::{Gather, PlanMode, RenderSettings};
 use crate::render::stats::{Bounded, Seconds, StoredCounts};
 use crate::render::tiles::TILE;
@@ -60,7 +61,7 @@ pub struct Renderer {
     settings: RenderSettings,
     estimators: Vec<Box<dyn Estimator>>,
     plan: Plan,
-    pilot: Option<Pilot>,
+    evidence: Evidence,
     plan_is_stale: bool,
     films: Vec<Film>,
     /// Pixels that see one plane alone, once a pass has asked for them.
@@ -105,7 +106,7 @@ impl Renderer {
         let size = settings.size;
         let plan = {
             let full = RenderSettings { plan: PlanMode::Full, ..settings.clone() };
-            Plan::new(&scene, &full, &slots(&estimators, settings.gather), None)
+            Plan::new(&scene, &full, &slots(&estimators, settings.gather), &Evidence::default())
         };
         Self {
             films: estimators.iter().map(|_| Film::new(size)).collect(),
@@ -117,7 +118,7 @@ impl Renderer {
             settings,
             estimators,
             plan,
-            pilot: None,
+            evidence: Evidence::default(),
             plan_is_stale: true,
             flat: None,
             last: None,
@@ -161,14 +162,15 @@ impl Renderer {
         let same_world = World::of(&scene) == World::of(&self.scene);
         if !same_world {
             self.flat = None;
+            self.evidence = Evidence::default();
         }
         let same_photons = same_world && photons_are_kept(&self.settings, &settings);
         if !same_photons {
             self.photons.clear();
             self.forget_counts();
         }
-        if !same_world || settings.seed != self.settings.seed || settings.max_depth != self.settings.max_depth {
-            self.pilot = None;
+        if settings.seed != self.settings.seed || settings.max_depth != self.settings.max_depth {
+            self.evidence.pilot = None;
         }
         let (before, after) = (slots(&self.estimators, self.settings.gather), slots(&estimators, settings.gather));
         let by_overlap = |all: &[Slot]| all.iter().any(|s| s.gather == Gather::Overlap);
@@ -210,13 +212,11 @@ impl Renderer {
 
     fn make_plan(&mut self, also: &[Slot]) {
         let start = Instant::now();
-        if self.pilot.is_none() {
-            self.pilot = Pilot::needed(&self.scene, &self.settings)
-                .then(|| Pilot::send(&self.scene, &self.intersector, &self.settings));
-        }
+        let known = std::mem::take(&mut self.evidence);
+        self.evidence = Evidence::of(&self.scene, &self.intersector, &self.settings, known);
         let mut served = slots(&self.estimators, self.settings.gather);
         served.extend_from_slice(also);
-        self.plan = Plan::new(&self.scene, &self.settings, &served, self.pilot.as_ref());
+        self.plan = Plan::new(&self.scene, &self.settings, &served, &self.evidence);
         self.plan_is_stale = false;
         self.seconds.plan = start.elapsed().as_secs_f64();
     }
@@ -227,8 +227,8 @@ impl Renderer {
         if self.plan_is_stale {
             self.make_plan(&[]);
         }
-        let (scene, settings, pilot) = (&self.scene, &self.settings, self.pilot.as_ref());
-        foreseen(scene, &self.intersector, settings, &self.plan, pilot, self.estimators.len())
+        let (scene, settings, pilot) = (&self.scene, &self.settings, self.evidence.pilot.as_ref());
+        foreseen(scene, &self.intersector, settings, &self.plan, pilot, self.estimators.len(), self.passes_held())
     }
 
     /// What [`Renderer::check_memory`] found; None if it was not asked.
@@ -246,6 +246,12 @@ impl Renderer {
         need.check(&self.settings)
     }
 
+    /// Passes that are in memory at once: whoever looks at one keeps it until the next is there. A report of final
+    /// gathering needs the last pass, also if the next is stopped.
+    fn passes_held(&self) -> usize {
+        if self.photons.is_used() || self.plan.gathers() { 2 } else { 1 }
+    }
+
     /// Makes the next pass of the estimators that have the fewest: photons, maps, and one image for each of them.
     ///
     /// The same settings give the same bits, whatever the number of threads.
@@ -255,6 +261,9 @@ impl Renderer {
         }
         let number = self.passes();
         let now: Vec<usize> = (0..self.films.len()).filter(|&i| self.films[i].passes() == number).collect();
+        if self.passes_held() == 1 {
+            self.last = None;
+        }
         let Some((pass, photon_trace, map_build)) = self.pass(number, watch) else {
             return Step::Cancelled;
         };
@@ -283,7 +292,8 @@ impl Renderer {
     pub fn draft(&self, photons: u64, watch: &dyn Watch) -> Step {
         let size = self.settings.size.map(|n| n.div_ceil(DRAFT_SCALE));
         let settings = RenderSettings { photons, size, plan: PlanMode::Full, ..self.settings.clone() };
-        let plan = Plan::new(&self.scene, &settings, &slots(&self.estimators, settings.gather), None);
+        let evidence = Evidence { pilot: None, projection: self.evidence.projection.clone() };
+        let plan = Plan::new(&self.scene, &settings, &slots(&self.estimators, settings.gather), &evidence);
         let number = self.passes();
         let now: Vec<usize> = (0..self.films.len()).filter(|&i| self.films[i].passes() == number).collect();
         let photons = self.emitter(&plan, &settings).run(0, &|| watch.cancelled());

@@ -121,6 +121,8 @@ impl TestCase {
             k: Some(printed::K),
             footprint_scale: Some(printed::PRINTED_SCALE * printed::DIFF_SMOOTHING),
             gather: Some("knn".into()),
+            // The number of photons is that of all directions, of which a ninetieth becomes caustic.
+            projection_map: Some("off".into()),
             ..Default::default()
         };
         let common = flags.common();

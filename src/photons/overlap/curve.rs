@@ -21,8 +21,7 @@ impl Curve {
     pub(super) fn around(boxes: &[Bounds]) -> Self {
         let ends = (Vec3::INFINITY, Vec3::NEG_INFINITY);
         let join = |a: (Vec3, Vec3), b: (Vec3, Vec3)| (a.0.min(b.0), a.1.max(b.1));
-        let (low, high) =
-            boxes.par_iter().fold(|| ends, |all, b| join(all, (b.0, b.0))).reduce(|| ends, join);
+        let (low, high) = boxes.par_iter().fold(|| ends, |all, b| join(all, (b.0, b.0))).reduce(|| ends, join);
         let side = (high - low).max_element();
         Self { low, scale: if side > 0.0 { (1 << BITS) as f32 * (1.0 - f32::EPSILON) / side } else { 0.0 } }
     }

@@ -48,8 +48,10 @@ impl Block {
     fn around(&self) -> (Vec3, Vec3) {
         let least = |lanes: &[f32; LANES]| lanes.iter().fold(f32::INFINITY, |m, v| m.min(*v));
         let largest = |lanes: &[f32; LANES]| lanes.iter().fold(f32::NEG_INFINITY, |m, v| m.max(*v));
-        (Vec3::from_array(std::array::from_fn(|i| least(&self.low[i]))),
-         Vec3::from_array(std::array::from_fn(|i| largest(&self.high[i]))))
+        (
+            Vec3::from_array(std::array::from_fn(|i| least(&self.low[i]))),
+            Vec3::from_array(std::array::from_fn(|i| largest(&self.high[i]))),
+        )
     }
 }
 
@@ -76,10 +78,8 @@ impl OverlapTree {
         keys.par_sort_unstable();
         let order: Vec<u32> = keys.par_iter().map(|&(_, i)| i).collect();
         drop(keys);
-        let counts: Vec<usize> = std::iter::successors(Some(order.len().div_ceil(LANES)), |n| {
-            (*n > 1).then(|| n.div_ceil(LANES))
-        })
-        .collect();
+        let counts: Vec<usize> =
+            std::iter::successors(Some(order.len().div_ceil(LANES)), |n| (*n > 1).then(|| n.div_ceil(LANES))).collect();
         let mut blocks = Vec::with_capacity(counts.iter().sum());
         order
             .par_chunks(LANES)

@@ -52,14 +52,14 @@ impl<F: FnMut(u32)> WithSimd for Walk<'_, F> {
 #[inline(always)]
 fn met(block: &Block, low: Vec3, high: Vec3) -> u32 {
     let mut bits = [0u32; LANES];
-    for lane in 0..LANES {
+    for (lane, bit) in bits.iter_mut().enumerate() {
         let is_met = (block.low[0][lane] <= high.x)
             & (block.low[1][lane] <= high.y)
             & (block.low[2][lane] <= high.z)
             & (block.high[0][lane] >= low.x)
             & (block.high[1][lane] >= low.y)
             & (block.high[2][lane] >= low.z);
-        bits[lane] = if is_met { 1 << lane } else { 0 };
+        *bit = if is_met { 1 << lane } else { 0 };
     }
     bits.iter().fold(0, |all, own| all | own)
 }

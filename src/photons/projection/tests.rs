@@ -65,9 +65,8 @@ fn no_photon_is_missed() {
                 let start = emit(&scene, &light, 1.0, x);
                 let ray = Ray { origin: start.origin, direction: start.direction };
                 let hit = intersector.closest(&ray);
-                let is_specular = hit.is_some_and(|h| {
-                    scene.materials[scene.geometry.material(h.primitive as usize)].is_specular()
-                });
+                let is_specular =
+                    hit.is_some_and(|h| scene.materials[scene.geometry.material(h.primitive as usize)].is_specular());
                 assert!(!is_specular || cells.holds(x), "{i}: {x:?} towards {}", start.direction);
                 met += u32::from(is_specular);
                 marked += u32::from(cells.holds(x));

@@ -274,10 +274,10 @@ fn photon_paths_end_where_the_photon_was_stored() {
                 let photon = &map.photons()[index as usize];
                 let path = photon_path(&pass, kind, index).expect("it was stored");
                 let last = path.vertices.last().expect("a surface");
-                assert_eq!(
-                    (last.position, last.direction, last.normal),
-                    (photon.position, photon.direction, photon.normal)
-                );
+                assert_eq!(last.position, photon.position);
+                // Directions are stored in four bytes.
+                assert!((last.direction - photon.direction).length() < 7e-5);
+                assert!((last.normal - photon.normal).length() < 7e-5);
                 assert_eq!((last.power, last.stored), (photon.power, Some(kind)));
                 let bounces = path.vertices.len() - 1;
                 let specular = |v: &PhotonVertex| v.surface != SurfaceKind::Diffuse;

@@ -140,7 +140,9 @@ pub fn emitted(scene: &Scene, settings: &RenderSettings) -> StoredPhotons {
         spread: settings.diffuse_spread,
     };
     let (sampling, photons, seed) = (settings.sampling, settings.photons, settings.seed);
-    Emitter { scene, intersector: &intersector, path, projection: None, sampling, photons, seed }.run(0, &interrupted).stored
+    Emitter { scene, intersector: &intersector, path, projection: None, sampling, photons, seed }
+        .run(0, &interrupted)
+        .stored
 }
 
 /// Places at the same distance from all four edges; the one that is drawn is the first.
