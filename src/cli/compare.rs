@@ -31,6 +31,7 @@ use crate::render::tiles::tiles;
 use crate::render::{Plan, Renderer};
 use crate::scene::{built_in, memory, open};
 use clap::{Args, ValueEnum};
+use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
@@ -388,15 +389,23 @@ impl<'a> Comparison<'a> {
             png_file::write(&folder.join(format!("{name}.png")), canvas.size, &canvas.rgb, &provenance)?;
             Ok(())
         };
-        for (name, image) in names.iter().zip(images) {
+        let enlarge = self.enlarge;
+        let of_estimator = |(name, image): (&String, &Image)| -> Result<(), Failure> {
             both(name, image, 1)?;
-            both(&format!("{name}_crop"), &image.crop(crop), self.enlarge)?;
-        }
+            both(&format!("{name}_crop"), &image.crop(crop), enlarge)
+        };
+        let sheet = self.sheet(images, crop, truth, report, exposure);
+        let whole_sheet = || -> Result<(), Failure> {
+            let sheet = sheet::draw(&sheet);
+            Ok(png_file::write(&folder.join("sheet.png"), sheet.size, &sheet.rgb, &provenance)?)
+        };
+        // Packing a PNG takes about as long as a view pass. Of several errors the first is told.
+        let (sheet, panels) =
+            rayon::join(whole_sheet, || names.par_iter().zip(images).map(of_estimator).collect::<Vec<_>>());
+        panels.into_iter().chain([sheet]).collect::<Result<(), Failure>>()?;
         if let Some((_, image)) = truth {
-            both("truth", image, if self.args.truth == Truth::Crop { self.enlarge } else { 1 })?;
+            both("truth", image, if self.args.truth == Truth::Crop { enlarge } else { 1 })?;
         }
-        let sheet = sheet::draw(&self.sheet(images, crop, truth, report, exposure));
-        png_file::write(&folder.join("sheet.png"), sheet.size, &sheet.rgb, &provenance)?;
         whole_file::write(&folder.join("timings.csv"), report.timings_csv().as_bytes())?;
         whole_file::write(&folder.join("report.json"), to_json(report)?.as_bytes())?;
         Ok(())

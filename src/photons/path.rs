@@ -215,8 +215,8 @@ impl Flight<'_> {
                     ray = Ray { origin: surface.leave(scene, w), direction: w };
                 }
                 _ => {
-                    let Some((next, kept, through)) = self.specular(material, &surface, &ray, power, &d, numbers()[0])
-                    else {
+                    let number = || numbers()[0];
+                    let Some((next, kept, through)) = self.specular(material, &surface, &ray, power, &d, number) else {
                         return Rgb::ZERO;
                     };
                     power = kept;
@@ -247,7 +247,7 @@ impl Flight<'_> {
         }
     }
 
-    /// One specular event by roulette on `x`: the next ray, the power it keeps, and whether it went through.
+    /// One specular event by roulette on the number that `x` makes, if it takes one: the next ray, the power it keeps, and whether it went through.
     fn specular(
         &self,
         material: &Material,
@@ -255,11 +255,13 @@ impl Flight<'_> {
         ray: &Ray,
         power: Rgb,
         d: &Differential,
-        x: f32,
+        x: impl Fn() -> f32,
     ) -> Option<(SpecularRay, Rgb, bool)> {
         let weights = specular_weights(material, surface, ray.direction)?;
         let reflect = share(power, weights.reflected);
         let refract = share(power, weights.refracted);
+        // Below 1 is every number: what reflects all light asks for none.
+        let x = if reflect < 1.0 { x() } else { 0.0 };
         let through = x >= reflect;
         let (next, weight, q) = if !through {
             (reflected(self.scene, surface, ray.direction, d), weights.reflected, reflect)

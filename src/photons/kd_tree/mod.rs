@@ -13,6 +13,7 @@ pub use nearest::Nearest;
 use build::{build, node_count};
 use glam::Vec3;
 use pulp::Arch;
+use rayon::prelude::*;
 use scan::{Search, SearchNearest, SearchOne, SearchWithin};
 
 /// Entries in a leaf, scanned in one go.
@@ -51,6 +52,15 @@ struct Block {
 impl Block {
     const EMPTY: Self =
         Self { x: [f32::INFINITY; LANES], y: [f32::INFINITY; LANES], z: [f32::INFINITY; LANES], index: [0; LANES] };
+
+    fn of(entries: &[(Vec3, u32)]) -> Self {
+        let mut block = Self::EMPTY;
+        for (lane, (p, index)) in entries.iter().enumerate() {
+            (block.x[lane], block.y[lane], block.z[lane]) = (p.x, p.y, p.z);
+            block.index[lane] = *index;
+        }
+        block
+    }
 }
 
 /// Memory of one entry: its place in a block and in the order, and two nodes for every leaf, which is half full at least.
@@ -144,21 +154,21 @@ impl KdTree {
         if !entries.is_empty() {
             build(&mut entries, &mut nodes, 0, 0, leaf);
         }
-        let leaves = nodes.iter().filter(|n| n.axis == IS_LEAF);
-        let mut blocks = Vec::with_capacity(leaves.map(|n| (n.count as usize).div_ceil(LANES)).sum());
-        for node in nodes.iter_mut().filter(|n| n.axis == IS_LEAF) {
-            let own = &entries[node.start as usize..(node.start + node.count) as usize];
-            node.start = blocks.len() as u32;
-            blocks.extend(own.chunks(LANES).map(|chunk| {
-                let mut block = Block::EMPTY;
-                for (lane, (p, index)) in chunk.iter().enumerate() {
-                    (block.x[lane], block.y[lane], block.z[lane]) = (p.x, p.y, p.z);
-                    block.index[lane] = *index;
-                }
-                block
-            }));
-        }
-        Self { nodes, blocks, order: entries.iter().map(|(_, index)| *index).collect() }
+        let leaves = nodes.iter_mut().filter(|n| n.axis == IS_LEAF);
+        let blocks = if leaf.is_multiple_of(LANES) {
+            // No leaf but the last has a block that is not full.
+            leaves.for_each(|node| node.start /= LANES as u32);
+            entries.par_chunks(LANES).map(Block::of).collect()
+        } else {
+            let mut blocks = Vec::with_capacity(2 * entries.len() / (LANES + 1) + count);
+            for node in leaves {
+                let own = &entries[node.start as usize..(node.start + node.count) as usize];
+                node.start = blocks.len() as u32;
+                blocks.extend(own.chunks(LANES).map(Block::of));
+            }
+            blocks
+        };
+        Self { nodes, blocks, order: entries.par_iter().map(|(_, index)| *index).collect() }
     }
 
     /// Fills `found` with the `k` nearest entries in the query's sphere and slice that `accept` takes.

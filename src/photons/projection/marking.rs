@@ -10,7 +10,7 @@ use glam::{DVec3, Vec3};
 use std::f64::consts::{PI, TAU};
 
 /// Cells along each of the two numbers that a direction or a place on a beam's disc is made of.
-const FINE: u32 = 256;
+const FINE: u32 = 512;
 /// The same where the light has area, so that directions are charted from several places.
 const COARSE: u32 = 64;
 /// Patches across and along a quad.

@@ -171,8 +171,8 @@ fn the_share_of_a_sphere_is_that_of_its_cone() {
         let share = ProjectionMap::new(&scene).expect("a ball").share();
         let sine = 1.0 / f64::from(distance);
         let cone = (1.0 - (1.0 - sine * sine).sqrt()) / 2.0;
-        // Cells along the rim are marked whole: a ring as wide as the diagonal of one, some 0.035 radians.
-        let wide = (1.0 - (sine.asin() + 0.035).cos()) / 2.0;
+        // Cells along the rim are marked whole: a ring as wide as the diagonal of one, some 0.02 radians.
+        let wide = (1.0 - (sine.asin() + 0.02).cos()) / 2.0;
         assert!((cone..wide).contains(&share), "{distance}: {share} for {cone}");
     }
 }
