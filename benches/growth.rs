@@ -65,14 +65,14 @@ fn words(text: &str) -> Vec<String> {
     text.split(' ').map(str::to_owned).collect()
 }
 
-/// A scene of some `triangles` in two mirror rings, of which the smaller has a third.
+/// A scene of some `triangles` in three mirror rings, six for each of their segments.
 fn rings(triangles: u64, folder: &Path) -> PathBuf {
     let path = folder.join(format!("rings-{triangles}.toml"));
-    let ring = |inner: f64, part: u64| {
+    let ring = |inner: f64| {
         format!(
             "[[shapes]]\nkind = \"ring\"\ninner = {inner:.1}\nouter = {:.1}\nheight = 0.5\nsegments = {}\nmaterial = \"metal\"\n",
             inner + 0.1,
-            (triangles * part / 18).max(3)
+            (triangles / 18).max(3)
         )
     };
     let text = format!(
@@ -80,9 +80,10 @@ fn rings(triangles: u64, folder: &Path) -> PathBuf {
          [materials.floor]\nkind = \"diffuse\"\nreflectance = [0.8, 0.8, 0.8]\n\
          [materials.metal]\nkind = \"mirror\"\nreflectance = [1.0, 1.0, 1.0]\n\
          [[shapes]]\nkind = \"quad\"\ncenter = [0.0, 0.0, 0.0]\nu = [10.0, 0.0, 0.0]\nv = [0.0, 0.0, -10.0]\nmaterial = \"floor\"\n\
-         {}{}[[lights]]\nkind = \"point\"\nposition = [-2.5, 2.2, -1.2]\npower = [100.0, 100.0, 100.0]\n",
-        ring(1.0, 1),
-        ring(1.5, 2)
+         {}{}{}[[lights]]\nkind = \"point\"\nposition = [-2.5, 2.2, -1.2]\npower = [100.0, 100.0, 100.0]\n",
+        ring(1.0),
+        ring(1.5),
+        ring(2.0)
     );
     std::fs::write(&path, text).expect("a folder that can be written to");
     path

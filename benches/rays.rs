@@ -7,15 +7,15 @@ use cusp::math::frame::{cosine_hemisphere, uniform_sphere};
 use cusp::math::sequence::{Sampling, Sequence};
 use cusp::scene::Geometry;
 use cusp::scene::geometry::NONE;
-use cusp::trace::intersector::build_parameters;
 use cusp::trace::surface::flat_normal;
 use cusp::trace::{Intersector, Ray};
 use glam::Vec3;
+use obvhs::BvhBuildParams;
 use obvhs::cwbvh::builder::build_cwbvh_from_tris;
 use obvhs::ray::RayHit;
 use obvhs::triangle::Triangle;
 use std::f32::consts::{PI, TAU};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// Half the side of the box about the mesh, metres.
 const SIDE: f32 = 2.0;
@@ -84,16 +84,18 @@ fn bounces(g: &Geometry, intersector: &Intersector, count: usize) -> Vec<Ray> {
 }
 
 const RAYS: usize = 100_000;
+/// By which both hierarchies are built.
+const BUILDER: BvhBuildParams = BvhBuildParams::very_slow_build();
 
 fn rays(c: &mut Criterion) {
     for rows in [50, 500] {
         let g = lumpy_ball(rows);
         let count = g.triangles.len();
-        let intersector = Intersector::new(&g, RADIUS);
+        let intersector = Intersector::by(&g, RADIUS, BUILDER);
         let rays = bounces(&g, &intersector, RAYS);
         let corner = |t: usize| g.corners(t).map(Into::into);
         let triangles: Vec<Triangle> = (0..count).map(corner).map(|[v0, v1, v2]| Triangle { v0, v1, v2 }).collect();
-        let bvh = build_cwbvh_from_tris(&triangles, build_parameters(count), &mut Duration::default());
+        let bvh = build_cwbvh_from_tris(&triangles, BUILDER, &mut Duration::default());
         let leaves: Vec<Triangle> = bvh.primitive_indices.iter().map(|&i| triangles[i as usize]).collect();
         let prepared = |r: &Ray| obvhs::ray::Ray::new_inf(r.origin.into(), r.direction.into());
 
@@ -127,5 +129,40 @@ fn rays(c: &mut Criterion) {
     }
 }
 
-criterion_group!(benches, rays);
+/// Seconds that each builder takes, and the rays that its hierarchy then takes in a second.
+fn builders(_: &mut Criterion) {
+    let all = [
+        ("very fast", BvhBuildParams::very_fast_build()),
+        ("fast", BvhBuildParams::fast_build()),
+        ("medium", BvhBuildParams::medium_build()),
+        ("slow", BvhBuildParams::slow_build()),
+        ("very slow", BvhBuildParams::very_slow_build()),
+    ];
+    for rows in [16, 50, 160, 500] {
+        let g = lumpy_ball(rows);
+        let mut rays = Vec::new();
+        for (name, parameters) in all {
+            let start = Instant::now();
+            let intersector = Intersector::by(&g, RADIUS, parameters);
+            let build = start.elapsed().as_secs_f64();
+            if rays.is_empty() {
+                rays = bounces(&g, &intersector, RAYS);
+            }
+            let times = (0..5).map(|_| {
+                let start = Instant::now();
+                std::hint::black_box(rays.iter().filter(|r| intersector.closest(r).is_some()).count());
+                start.elapsed().as_secs_f64()
+            });
+            let best = times.fold(f64::INFINITY, f64::min) / RAYS as f64;
+            let count = g.triangles.len();
+            println!(
+                "{count} triangles, {name}: built in {build:.4} s, {:.3} Mrays/s, {:.1} rays each by which it is built",
+                1e-6 / best,
+                build / best / count as f64
+            );
+        }
+    }
+}
+
+criterion_group!(benches, builders, rays);
 criterion_main!(benches);

@@ -1,4 +1,5 @@
-//! The window's own work: a frame while the worker renders at full load, and from a change to its first new tile.
+//! The window's own work: a frame while the worker renders at full load, also at the far end of photons and pixels, and the
+//! time to the first tile after the window opens and after a change.
 
 #![allow(clippy::expect_used, missing_docs, reason = "a failed expectation is how this program reports")]
 
@@ -17,6 +18,8 @@ const REFRESH: Duration = Duration::from_micros(16_667);
 /// Frames and changes that are measured.
 const FRAMES: usize = 600;
 const CHANGES: usize = 30;
+/// Windows that are opened.
+const OPENINGS: usize = 20;
 
 /// A window whose frames are run by hand, as often as a screen would.
 struct Window {
@@ -29,13 +32,16 @@ struct Window {
 
 impl Window {
     fn open(scene: &str) -> Self {
+        Self::of(Session { passes: 1_000_000, ..Session::of(scene) })
+    }
+
+    fn of(session: Session) -> Self {
         let context = Context::default();
         let (want, wanted) = channel();
         context.set_request_repaint_callback(move |_| {
             // The window may be gone.
             let _ = want.send(());
         });
-        let session = Session { passes: 1_000_000, ..Session::of(scene) };
         let workbench = Workbench::new(&context, Opened::new(session).expect("built in"), None).expect("threads");
         Self { context, workbench, wanted, last: Instant::now() }
     }
@@ -132,5 +138,33 @@ fn latency(_: &mut Criterion) {
     }
 }
 
-criterion_group!(benches, frames, latency);
+/// From the beginning of a new window's first frame to the frame that shows the first tile.
+fn opening(_: &mut Criterion) {
+    for scene in ["ring", "cornell", "glass_ball"] {
+        let times = (0..OPENINGS).map(|_| {
+            let mut window = Window::open(scene);
+            let start = Instant::now();
+            window.frame();
+            while window.workbench.render().first_tile().is_none() && start.elapsed() < Duration::from_secs(10) {
+                window.paced();
+            }
+            start.elapsed()
+        });
+        summary(&format!("{scene}, first frame to first tile"), times.collect());
+    }
+}
+
+/// Frames while passes of ten million photons and of four million pixels are made.
+fn far_end(_: &mut Criterion) {
+    for (scene, photons, size) in [("ring", 10_000_000, 2048), ("cornell", 10_000_000, 512)] {
+        let mut session = Session { size: Some([size, size]), ..Session::of(scene) };
+        session.render.photons = Some(photons);
+        let mut window = Window::of(session);
+        window.run_for(Duration::from_secs(2));
+        let what = format!("frame under load, {scene}, {photons} photons, {size}x{size} pixels");
+        summary(&what, (0..FRAMES).map(|_| window.paced()).collect());
+    }
+}
+
+criterion_group!(benches, opening, frames, far_end, latency);
 criterion_main!(benches);

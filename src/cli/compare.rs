@@ -214,6 +214,9 @@ impl<'a> Comparison<'a> {
         let hidden = self.args.flags.quiet || self.args.flags.json;
         let steps = tiles(Rect::whole(self.renderer.settings().size)).len() as u64;
         let progress = bar(steps, "estimators", hidden);
+        if let Some(need) = self.renderer.memory_need() {
+            progress.println(need.text());
+        }
         let collector = Collector::new(self.renderer.settings().size, self.renderer.estimators().len(), &progress);
         let step = self.renderer.step(&collector);
         progress.finish_and_clear();

@@ -119,6 +119,9 @@ pub fn run(args: &RenderArgs) -> Result<(), Failure> {
 fn passes(args: &RenderArgs, rule: StopRule, renderer: &mut Renderer, start: Instant) -> (StoppedBy, Option<String>) {
     let per_pass = tiles(Rect::whole(renderer.settings().size)).len() as u64;
     let bar = bar(per_pass * u64::from(rule.passes.unwrap_or(1)), "render", args.flags.quiet || args.flags.json);
+    if let Some(need) = renderer.memory_need() {
+        bar.println(need.text());
+    }
     let mut now = Standing::default();
     let mut late = None;
     let stopped_by = loop {

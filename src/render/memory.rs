@@ -11,7 +11,7 @@ use crate::render::evidence::Pilot;
 use crate::render::plan::Plan;
 use crate::render::settings::{RenderSettings, SettingError};
 use crate::scene::Scene;
-use crate::scene::memory::{Shortage, bytes, check};
+use crate::scene::memory::{Shortage, bytes, check, text};
 use crate::trace::Intersector;
 use glam::{DVec3, Vec3};
 use serde::Serialize;
@@ -54,6 +54,12 @@ impl MemoryNeed {
             photons: bytes(photons_stored, passes * size_of::<StoredPhoton>()),
             maps: bytes(photons_stored, BUILT_BYTES + passes * map_bytes(parts) + gathering),
         }
+    }
+
+    /// In words.
+    pub fn text(&self) -> String {
+        let [whole, photons, maps, images] = [self.total(), self.photons, self.maps, self.images].map(text);
+        format!("some {whole} of memory: photons {photons}, maps {maps}, images {images}")
     }
 
     /// Holds it against what the machine can give now.

@@ -71,7 +71,8 @@ impl Pass {
         number: u32,
         cancelled: &(dyn Fn() -> bool + Sync),
     ) -> Result<Option<Self>, Shortage> {
-        let intersector = Arc::new(Intersector::new(&scene.geometry, scene.radius));
+        let intersector =
+            Arc::new(Intersector::for_rays(&scene.geometry, scene.radius, settings.rays_of_pass(slots.len())));
         let evidence = Evidence::of(&scene, &intersector, &settings, Evidence::default());
         let plan = Plan::new(&scene, &settings, slots, &evidence);
         foreseen(&scene, &intersector, &settings, &plan, evidence.pilot.as_ref(), 1, 1).check(&settings)?;

@@ -101,7 +101,7 @@ impl Renderer {
     /// The same without a plan yet: the first step makes it. Until then [`Renderer::plan`] has every part on.
     pub fn unplanned(scene: Arc<Scene>, settings: RenderSettings, estimators: Vec<Box<dyn Estimator>>) -> Self {
         let start = Instant::now();
-        let intersector = Arc::new(Intersector::new(&scene.geometry, scene.radius));
+        let intersector = Arc::new(built(&scene, &settings, estimators.len()));
         let bvh = start.elapsed().as_secs_f64();
         let size = settings.size;
         let plan = {
@@ -156,7 +156,7 @@ impl Renderer {
     pub fn change(&mut self, scene: Arc<Scene>, settings: RenderSettings, estimators: Vec<Box<dyn Estimator>>) {
         if !Arc::ptr_eq(&scene.geometry, &self.scene.geometry) {
             let start = Instant::now();
-            self.intersector = Arc::new(Intersector::new(&scene.geometry, scene.radius));
+            self.intersector = Arc::new(built(&scene, &settings, estimators.len()));
             self.seconds.bvh = start.elapsed().as_secs_f64();
         }
         let same_world = World::of(&scene) == World::of(&self.scene);
@@ -521,6 +521,14 @@ impl Renderer {
     pub fn warnings(&self) -> Vec<String> {
         self.totals.warnings(&self.scene, &self.plan)
     }
+}
+
+/// Passes that a render is expected to make: how many is known only when it ends.
+const EXPECTED_PASSES: u64 = 16;
+
+fn built(scene: &Scene, settings: &RenderSettings, estimators: usize) -> Intersector {
+    let rays = settings.rays_of_pass(estimators).saturating_mul(EXPECTED_PASSES);
+    Intersector::for_rays(&scene.geometry, scene.radius, rays)
 }
 
 /// Estimators with the gather that they use.

@@ -215,6 +215,14 @@ impl RenderSettings {
         Ok(settings)
     }
 
+    /// Rays of one pass under so many estimators, to the power of ten: three or four for a photon, and for a pixel those of
+    /// its view paths and shadows.
+    pub fn rays_of_pass(&self, estimators: usize) -> u64 {
+        let pixels = u64::from(self.size[0]) * u64::from(self.size[1]);
+        let views = pixels.saturating_mul(8 * estimators as u64);
+        self.photons.saturating_mul(4).saturating_add(views)
+    }
+
     /// The final gatherings of [`RenderSettings::final_gather`]; None stands for `none`.
     pub fn final_gatherings(&self) -> Vec<Option<FinalGathering>> {
         // Its text was read when the settings were made.

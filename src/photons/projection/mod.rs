@@ -8,17 +8,20 @@
 
 mod cells;
 mod marking;
+mod voxels;
 
 pub use cells::Cells;
 
 use crate::math::rgb::mean;
-use crate::scene::Scene;
+use crate::scene::{Light, Scene};
 use glam::DVec3;
 use marking::Marking;
 use rayon::prelude::*;
 
 /// Surfaces that one thread marks at a time.
-const CHUNK: usize = 4096;
+const CHUNK: usize = 1024;
+/// More surfaces than this are marked by the cells of a grid that they lie in.
+const MOST_TRIANGLES: usize = 20_000;
 
 /// The cells of all lights.
 #[derive(Clone, Debug)]
@@ -31,39 +34,46 @@ impl ProjectionMap {
     /// The map of a scene; None where no surface is specular or no light has power.
     pub fn new(scene: &Scene) -> Option<Self> {
         let g = &scene.geometry;
-        let specular: Vec<usize> =
+        let mut specular: Vec<usize> =
             (0..g.primitive_count()).filter(|&i| scene.materials[g.material(i)].is_specular()).collect();
         if specular.is_empty() {
             return None;
         }
-        let lights: Vec<Cells> = scene
-            .lights
-            .iter()
-            .map(|light| {
-                let Some(marking) = Marking::new(light, specular.len(), f64::from(scene.radius)) else {
-                    return Cells::whole();
-                };
-                let mark = |chunk: &[usize]| {
-                    let mut bits = marking.empty();
-                    for &i in chunk {
-                        match g.triangles.get(i) {
-                            Some(_) => marking.triangle(g.corners(i).map(|p| p.as_dvec3()), &mut bits),
-                            None => {
-                                let s = g.spheres[i - g.triangles.len()];
-                                marking.ball(s.center.as_dvec3(), f64::from(s.radius), &mut bits);
-                            }
-                        }
-                    }
-                    bits
-                };
-                let union = |mut a: Vec<u64>, b: Vec<u64>| {
-                    a.iter_mut().zip(b).for_each(|(a, b)| *a |= b);
-                    a
-                };
-                let bits = specular.par_chunks(CHUNK).map(mark).reduce(|| marking.empty(), union);
-                Cells::marked(marking.counts(), &marking.finished(bits))
-            })
-            .collect();
+        let corners = |i: usize| g.corners(i).map(|p| p.as_dvec3());
+        let is_triangle = |i: &usize| *i < g.triangles.len();
+        let balls: Vec<(DVec3, f64)> = if specular.len() > MOST_TRIANGLES {
+            let triangles = specular.len() - specular.iter().rev().take_while(|i| !is_triangle(i)).count();
+            voxels::balls(&corners, &specular.drain(..triangles).collect::<Vec<_>>())
+        } else {
+            Vec::new()
+        };
+        let mark_all = |marking: &Marking| {
+            let one = |bits: &mut Vec<u64>, i: usize| match g.spheres.get(i.wrapping_sub(g.triangles.len())) {
+                None => marking.triangle(corners(i), bits),
+                Some(s) => marking.ball(s.center.as_dvec3(), f64::from(s.radius), bits),
+            };
+            let primitives = specular.par_chunks(CHUNK).map(|chunk| {
+                let mut bits = marking.empty();
+                chunk.iter().for_each(|&i| one(&mut bits, i));
+                bits
+            });
+            let cells = balls.par_chunks(CHUNK).map(|chunk| {
+                let mut bits = marking.empty();
+                chunk.iter().for_each(|(center, radius)| marking.ball(*center, *radius, &mut bits));
+                bits
+            });
+            let union = |mut a: Vec<u64>, b: Vec<u64>| {
+                a.iter_mut().zip(b).for_each(|(a, b)| *a |= b);
+                a
+            };
+            primitives.chain(cells).reduce(|| marking.empty(), union)
+        };
+        let surfaces = specular.len() + balls.len();
+        let of_light = |light: &Light| match Marking::new(light, surfaces, f64::from(scene.radius)) {
+            Some(marking) => Cells::marked(marking.counts(), &marking.finished(mark_all(&marking))),
+            None => Cells::whole(),
+        };
+        let lights: Vec<Cells> = scene.lights.iter().map(of_light).collect();
         let flux: Vec<f64> = scene.lights.iter().map(|l| f64::from(mean(l.flux()))).collect();
         let aimed: f64 = flux.iter().zip(&lights).map(|(f, c)| f * c.share()).sum();
         let share = aimed / flux.iter().sum::<f64>();

@@ -46,7 +46,7 @@ pub(super) fn show(panes: &mut Panes, ui: &mut Ui) {
         let stored = &pass.photons.stored;
         let photons = stored.direct.len() + stored.caustic.len() + stored.global.len();
         let mib = |n: usize| format!("{:.2} MiB", n as f64 / f64::from(1 << 20));
-        fact(ui, "Photons of a pass", mib(photons * size_of::<crate::photons::Photon>()));
+        fact(ui, "Photons of a pass", mib(photons * size_of::<crate::photons::StoredPhoton>()));
         let mapped: usize = pass.maps.all().map(|m| m.photons().len()).sum();
         fact(ui, "Map photons", mib(mapped * size_of::<crate::photons::MapPhoton>()));
         let peak = crate::render::stats::peak_rss_bytes().filter(|_| !panes.desk.untimed);
