@@ -28,6 +28,54 @@ const MOST_QUARTERED: u32 = 6;
 /// A cap of directions is as good as everything from here on, radians.
 const LARGEST_CAP: f64 = 1.5;
 
+/// Most cells that a chunk of surfaces sets before all are taken as set: a light that is too close to many surfaces sees
+/// them in all directions.
+const MOST_WORK: usize = 1 << 23;
+
+/// Cells that are set.
+pub(super) struct Marks {
+    words: Vec<u64>,
+    /// Cells set so far, however often.
+    work: usize,
+}
+
+impl Marks {
+    #[inline]
+    fn set(&mut self, cell: u32) {
+        self.words[(cell >> 6) as usize] |= 1 << (cell & 63);
+        self.work += 1;
+    }
+
+    /// Sets `count` cells from `first` on, both multiples of 64.
+    fn fill(&mut self, first: u32, count: u32) {
+        let (first, count) = (first as usize / 64, count as usize / 64);
+        self.words[first..first + count].fill(u64::MAX);
+        self.work += count;
+    }
+
+    fn is_full(&self) -> bool {
+        self.work > MOST_WORK
+    }
+
+    /// The cells that either has set.
+    pub(super) fn or(mut self, other: &Self) -> Self {
+        self.words.iter_mut().zip(&other.words).for_each(|(a, b)| *a |= b);
+        self
+    }
+
+    /// When a chunk is done.
+    pub(super) fn done(mut self) -> Self {
+        if self.is_full() {
+            self.words.fill(u64::MAX);
+        }
+        Self { work: 0, ..self }
+    }
+
+    fn has(&self, cell: u32) -> bool {
+        self.words[(cell >> 6) as usize] >> (cell & 63) & 1 == 1
+    }
+}
+
 /// How the numbers of a light become directions or places.
 pub(super) enum Marking {
     /// Directions from patches of the light, each with its own cells.
@@ -131,13 +179,13 @@ impl Marking {
         }
     }
 
-    /// Bits of which none is set.
-    pub(super) fn empty(&self) -> Vec<u64> {
-        vec![0; (self.counts().iter().product::<u32>() as usize).div_ceil(64)]
+    /// None set.
+    pub(super) fn empty(&self) -> Marks {
+        Marks { words: vec![0; (self.counts().iter().product::<u32>() as usize).div_ceil(64)], work: 0 }
     }
 
     /// Marks what may meet a triangle.
-    pub(super) fn triangle(&self, corners: [DVec3; 3], bits: &mut [u64]) {
+    pub(super) fn triangle(&self, corners: [DVec3; 3], bits: &mut Marks) {
         match self {
             Self::Directions { patches, .. } => {
                 patches.iter().for_each(|p| self.quartered(Some(p), corners, MOST_QUARTERED, bits));
@@ -147,7 +195,7 @@ impl Marking {
     }
 
     /// Marks what may meet a ball.
-    pub(super) fn ball(&self, center: DVec3, radius: f64, bits: &mut [u64]) {
+    pub(super) fn ball(&self, center: DVec3, radius: f64, bits: &mut Marks) {
         match self {
             Self::Directions { patches, .. } => patches.iter().for_each(|p| self.cap(p, center, radius, bits)),
             Self::Disc { .. } => self.shadow(center, radius, bits),
@@ -155,7 +203,10 @@ impl Marking {
     }
 
     /// A triangle as one ball, or as four triangles while it looks large from the patch, or on the disc.
-    fn quartered(&self, patch: Option<&Patch>, corners: [DVec3; 3], left: u32, bits: &mut [u64]) {
+    fn quartered(&self, patch: Option<&Patch>, corners: [DVec3; 3], left: u32, bits: &mut Marks) {
+        if bits.is_full() {
+            return;
+        }
         let (center, radius) = ball_around(corners);
         let is_large = match (self, patch) {
             (Self::Directions { rows, .. }, Some(p)) => {
@@ -179,25 +230,29 @@ impl Marking {
     }
 
     /// Marks the directions from anywhere in a patch to anywhere in a ball: a cap of the sphere of directions.
-    fn cap(&self, patch: &Patch, center: DVec3, radius: f64, bits: &mut [u64]) {
+    fn cap(&self, patch: &Patch, center: DVec3, radius: f64, bits: &mut Marks) {
         let Self::Directions { counts, rows, margin, .. } = self else { return };
+        if bits.is_full() {
+            return;
+        }
         let columns = if counts[2] == 1 { counts[1] } else { counts[3] };
         let to = center - patch.center;
         let distance = to.length();
         let reach = radius + patch.radius + margin;
         let cap = if distance > reach { libm::asin(reach / distance) + MARGIN } else { PI };
-        let (mut angle, mut turn) = (0.0, 0.0);
-        if cap < LARGEST_CAP {
-            let along = to / distance;
-            angle = libm::acos(along.dot(patch.axis).clamp(-1.0, 1.0));
-            turn = libm::atan2(along.dot(patch.tangents[1]), along.dot(patch.tangents[0]));
+        if cap >= LARGEST_CAP {
+            bits.fill(patch.first, (rows.len() as u32 - 1) * columns);
+            return;
         }
-        let (low, high) = if cap < LARGEST_CAP { (angle - cap, angle + cap) } else { (0.0, PI) };
+        let along = to / distance;
+        let angle = libm::acos(along.dot(patch.axis).clamp(-1.0, 1.0));
+        let turn = libm::atan2(along.dot(patch.tangents[1]), along.dot(patch.tangents[0]));
+        let (low, high) = (angle - cap, angle + cap);
         // Where a cap is widest about the axis it touches a meridian.
         let widest = libm::acos((libm::cos(angle) / libm::cos(cap)).clamp(-1.0, 1.0));
         let half_width = |at: f64| {
             let across = libm::sin(at) * libm::sin(angle);
-            if cap >= LARGEST_CAP || across < 1e-12 {
+            if across < 1e-12 {
                 return PI;
             }
             libm::acos(((libm::cos(cap) - libm::cos(at) * libm::cos(angle)) / across).clamp(-1.0, 1.0))
@@ -217,28 +272,31 @@ impl Marking {
             let (left, right) = (((turn - half) * scale).floor() as i64, ((turn + half) * scale).floor() as i64);
             let row = patch.first + row as u32 * columns;
             for column in left..=right.min(left + i64::from(columns) - 1) {
-                set(bits, row + column.rem_euclid(i64::from(columns)) as u32);
+                bits.set(row + column.rem_euclid(i64::from(columns)) as u32);
             }
         }
     }
 
     /// Marks the squares of the disc's plane, of [`FINE`] a side, that a ball's shadow meets.
-    fn shadow(&self, center: DVec3, radius: f64, bits: &mut [u64]) {
+    fn shadow(&self, center: DVec3, radius: f64, bits: &mut Marks) {
         let Self::Disc { center: disc, tangents, radius: whole } = self else { return };
+        if bits.is_full() {
+            return;
+        }
         let to = (center - disc) / whole;
         let reach = radius / whole + MARGIN;
         let [rows, columns] = tangents.map(|t| squares(to.dot(t), reach));
         for row in rows {
             for column in columns.clone() {
-                set(bits, row * FINE + column);
+                bits.set(row * FINE + column);
             }
         }
     }
 
-    /// Bits of cells from bits as they were set.
-    pub(super) fn finished(&self, bits: Vec<u64>) -> Vec<u64> {
+    /// Bits of cells from what was set.
+    pub(super) fn finished(&self, bits: Marks) -> Vec<u64> {
         if let Self::Directions { .. } = self {
-            return bits;
+            return bits.words;
         }
         let mut cells = self.empty();
         // The concentric map stretches no length by more than 1.5.
@@ -248,11 +306,11 @@ impl Marking {
             let (x, y) = concentric_disc(middle(cell / FINE), middle(cell % FINE));
             let columns = squares(y.into(), reach);
             let mut met = squares(x.into(), reach).flat_map(|r| columns.clone().map(move |c| r * FINE + c));
-            if met.any(|i| bits[(i >> 6) as usize] >> (i & 63) & 1 == 1) {
-                set(&mut cells, cell);
+            if met.any(|i| bits.has(i)) {
+                cells.set(cell);
             }
         }
-        cells
+        cells.words
     }
 }
 
@@ -260,8 +318,4 @@ impl Marking {
 fn squares(at: f64, reach: f64) -> std::ops::RangeInclusive<u32> {
     let square = |x: f64| ((x + 1.0) / 2.0 * f64::from(FINE)).clamp(0.0, f64::from(FINE - 1)) as u32;
     square(at - reach)..=square(at + reach)
-}
-
-fn set(bits: &mut [u64], cell: u32) {
-    bits[(cell >> 6) as usize] |= 1 << (cell & 63);
 }

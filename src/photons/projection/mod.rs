@@ -15,7 +15,7 @@ pub use cells::Cells;
 use crate::math::rgb::mean;
 use crate::scene::{Light, Scene};
 use glam::DVec3;
-use marking::Marking;
+use marking::{Marking, Marks};
 use rayon::prelude::*;
 
 /// Surfaces that one thread marks at a time.
@@ -48,25 +48,21 @@ impl ProjectionMap {
             Vec::new()
         };
         let mark_all = |marking: &Marking| {
-            let one = |bits: &mut Vec<u64>, i: usize| match g.spheres.get(i.wrapping_sub(g.triangles.len())) {
+            let one = |bits: &mut Marks, i: usize| match g.spheres.get(i.wrapping_sub(g.triangles.len())) {
                 None => marking.triangle(corners(i), bits),
                 Some(s) => marking.ball(s.center.as_dvec3(), f64::from(s.radius), bits),
             };
             let primitives = specular.par_chunks(CHUNK).map(|chunk| {
                 let mut bits = marking.empty();
                 chunk.iter().for_each(|&i| one(&mut bits, i));
-                bits
+                bits.done()
             });
             let cells = balls.par_chunks(CHUNK).map(|chunk| {
                 let mut bits = marking.empty();
                 chunk.iter().for_each(|(center, radius)| marking.ball(*center, *radius, &mut bits));
-                bits
+                bits.done()
             });
-            let union = |mut a: Vec<u64>, b: Vec<u64>| {
-                a.iter_mut().zip(b).for_each(|(a, b)| *a |= b);
-                a
-            };
-            primitives.chain(cells).reduce(|| marking.empty(), union)
+            primitives.chain(cells).reduce(|| marking.empty(), |a, b| a.or(&b))
         };
         let surfaces = specular.len() + balls.len();
         let of_light = |light: &Light| match Marking::new(light, surfaces, f64::from(scene.radius)) {
