@@ -57,7 +57,9 @@ fn nearest(times: u32) {
 
 fn renderer(scene: &str, estimator: &str, photons: i64, size: u32) -> Renderer {
     let scene = open(scene).expect("built in");
-    let flags = RenderFile { photons: Some(photons), ..Default::default() };
+    // Without a projection map: what is on record is the work for so many photons of all directions.
+    let projection_map = Some("off".into());
+    let flags = RenderFile { photons: Some(photons), projection_map, ..Default::default() };
     let settings = RenderSettings::new(&scene, &flags, Some([size, size]), 1).expect("valid");
     Renderer::new(scene.into(), settings, estimators(estimator).expect("registered"))
 }
