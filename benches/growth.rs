@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// Phases of a render, as the report names them.
-const PHASES: [&str; 7] = ["load", "bvh", "photon_trace", "map_build", "view_trace", "gather", "estimate"];
+const PHASES: [&str; 8] = ["load", "bvh", "plan", "photon_trace", "map_build", "view_trace", "gather", "estimate"];
 
 /// Seconds below which a phase says nothing about its growth.
 const SHORTEST: f64 = 0.004;
@@ -168,7 +168,7 @@ fn memory(points: &[Point]) -> Vec<(f64, f64)> {
 
 fn table(sweep: &Sweep, points: &[Point]) -> String {
     let mut text =
-        format!("| {} | {} | peak, MB | stated, MB |\n|{}\n", sweep.name, PHASES.join(" | "), " --- |".repeat(10));
+        format!("| {} | {} | peak, MB | stated, MB |\n|{}\n", sweep.name, PHASES.join(" | "), " --- |".repeat(PHASES.len() + 3));
     for p in points {
         let seconds: Vec<String> = p.seconds.iter().map(|s| format!("{s:.4}")).collect();
         let megabytes = [p.memory, p.stated].map(|b| format!("{:.1}", b / 1e6));
