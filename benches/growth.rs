@@ -167,8 +167,12 @@ fn memory(points: &[Point]) -> Vec<(f64, f64)> {
 }
 
 fn table(sweep: &Sweep, points: &[Point]) -> String {
-    let mut text =
-        format!("| {} | {} | peak, MB | stated, MB |\n|{}\n", sweep.name, PHASES.join(" | "), " --- |".repeat(PHASES.len() + 3));
+    let mut text = format!(
+        "| {} | {} | peak, MB | stated, MB |\n|{}\n",
+        sweep.name,
+        PHASES.join(" | "),
+        " --- |".repeat(PHASES.len() + 3)
+    );
     for p in points {
         let seconds: Vec<String> = p.seconds.iter().map(|s| format!("{s:.4}")).collect();
         let megabytes = [p.memory, p.stated].map(|b| format!("{:.1}", b / 1e6));
