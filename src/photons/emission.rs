@@ -70,7 +70,8 @@ pub struct Emission {
     pub bounded: bool,
 }
 
-/// Starts one photon of a light from four numbers in `[0, 1)`, where `count` photons would share the whole of it.
+/// Starts one photon of a light from four numbers in `[0, 1)`, where `count` photons (positive, not whole where a
+/// projection map draws them from a part of the light) would share the whole of it.
 pub fn emit(scene: &Scene, light: &Light, count: f64, x: [f32; 4]) -> Emission {
     let n = count as f32;
     let from_point = |origin: Vec3, direction: Vec3, solid_angle: f32| Emission {

@@ -247,7 +247,8 @@ impl Flight<'_> {
         }
     }
 
-    /// One specular event by roulette on the number that `x` makes, if it takes one: the next ray, the power it keeps, and whether it went through.
+    /// One specular event by roulette on the number that `x` makes, if it takes one: the next ray, the power it keeps, and
+    /// whether it went through.
     fn specular(
         &self,
         material: &Material,

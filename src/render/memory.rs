@@ -113,8 +113,9 @@ pub fn check_images(settings: &RenderSettings, estimators: usize) -> Result<(), 
         .map_err(|short| SettingError { place: "size".into(), what: short.to_string() })
 }
 
-/// What a pass is expected to need where `passes` are held at once. Without a pilot it takes the most that a pass can store, and sends one where that
-/// would not fit.
+/// What a pass is expected to need where `passes` are held at once.
+///
+/// Without a pilot it takes the most that a pass can store, and sends one where that would not fit.
 pub fn foreseen(
     scene: &Scene,
     intersector: &Intersector,

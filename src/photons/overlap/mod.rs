@@ -12,16 +12,13 @@ use curve::Curve;
 use glam::Vec3;
 use pulp::Arch;
 use rayon::prelude::*;
-use walk::Walk;
+use walk::{DEEPEST, Walk};
 
 /// Boxes that are tested at once.
 const LANES: usize = 8;
 
 /// Memory of one entry: its box, its share of the boxes above, and its place in the order.
 pub const BYTES_PER_ENTRY: usize = 28 + size_of::<u32>();
-
-/// Memory of one entry while the tree is built, beside that of the tree: its box, and its key with its number.
-pub const BYTES_PER_BUILT_ENTRY: usize = size_of::<Bounds>() + size_of::<(u64, u32)>();
 
 /// Centre and half-size.
 type Bounds = (Vec3, Vec3);
@@ -35,13 +32,16 @@ struct Block {
 }
 
 impl Block {
-    const EMPTY: Self = Self { low: [[f32::INFINITY; LANES]; 3], high: [[f32::NEG_INFINITY; LANES]; 3] };
-
-    fn put(&mut self, lane: usize, low: Vec3, high: Vec3) {
-        for axis in 0..3 {
-            self.low[axis][lane] = low[axis];
-            self.high[axis][lane] = high[axis];
+    /// Of eight boxes or fewer, by their corners.
+    fn of(boxes: impl Iterator<Item = (Vec3, Vec3)>) -> Self {
+        let mut block = Self { low: [[f32::INFINITY; LANES]; 3], high: [[f32::NEG_INFINITY; LANES]; 3] };
+        for (lane, (low, high)) in boxes.take(LANES).enumerate() {
+            for axis in 0..3 {
+                block.low[axis][lane] = low[axis];
+                block.high[axis][lane] = high[axis];
+            }
         }
+        block
     }
 
     /// Corners of the box around all of them.
@@ -78,34 +78,15 @@ impl OverlapTree {
         keys.par_sort_unstable();
         let order: Vec<u32> = keys.par_iter().map(|&(_, i)| i).collect();
         drop(keys);
-        let counts: Vec<usize> =
-            std::iter::successors(Some(order.len().div_ceil(LANES)), |n| (*n > 1).then(|| n.div_ceil(LANES))).collect();
-        let mut blocks = Vec::with_capacity(counts.iter().sum());
-        order
-            .par_chunks(LANES)
-            .map(|entries| {
-                let mut block = Block::EMPTY;
-                for (lane, &i) in entries.iter().enumerate() {
-                    let (low, high) = corners(boxes[i as usize]);
-                    block.put(lane, low, high);
-                }
-                block
-            })
-            .collect_into_vec(&mut blocks);
+        // All levels: a seventh more than the lowest, and one for each that is not full.
+        let mut blocks = Vec::with_capacity(order.len() / (LANES - 1) + DEEPEST);
+        let of_entries = |entries: &[u32]| Block::of(entries.iter().map(|&i| corners(boxes[i as usize])));
+        order.par_chunks(LANES).map(of_entries).collect_into_vec(&mut blocks);
         let mut levels = vec![0];
         while blocks.len() - levels[levels.len() - 1] as usize > 1 {
             let below = levels[levels.len() - 1] as usize;
-            let next: Vec<Block> = blocks[below..]
-                .par_chunks(LANES)
-                .map(|children| {
-                    let mut block = Block::EMPTY;
-                    for (lane, child) in children.iter().enumerate() {
-                        let (low, high) = child.around();
-                        block.put(lane, low, high);
-                    }
-                    block
-                })
-                .collect();
+            let of_blocks = |children: &[Block]| Block::of(children.iter().map(Block::around));
+            let next: Vec<Block> = blocks[below..].par_chunks(LANES).map(of_blocks).collect();
             levels.push(blocks.len() as u32);
             blocks.extend(next);
         }

@@ -5,7 +5,7 @@ use glam::Vec3;
 use pulp::{Simd, WithSimd};
 
 /// Levels of a tree over 2³¹ entries, and one.
-const DEEPEST: usize = 12;
+pub(super) const DEEPEST: usize = 12;
 
 /// Looks for the entries that meet a box.
 pub(super) struct Walk<'a, F> {
