@@ -4,9 +4,11 @@ use crate::math::rgb::Rgb;
 use crate::photons::Photon;
 use crate::photons::footprint::FilterTransform;
 use crate::photons::kd_tree::{self, KdTree, Nearest, NearestQuery};
-use crate::photons::overlap::{self, OverlapTree};
+use crate::photons::overlap::{self, Block, LANES, OverlapTree, packing_order};
+use crate::photons::photon::Footprinted;
 use glam::{DVec2, Vec2, Vec3};
 use rayon::prelude::*;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Smallest cosine between the normals of a photon's surface and the view hit's for the photon to count.
 ///
@@ -157,61 +159,66 @@ pub fn map_bytes(parts: MapParts) -> usize {
 /// the photons are made ready, the kd-tree is built after that.
 pub const BUILT_BYTES: usize = kd_tree::BYTES_PER_BUILT_ENTRY;
 
-/// Photons that one thread makes ready at a time.
-const CHUNK: usize = 4096;
-
-/// What was met while photons were made ready.
-#[derive(Clone, Copy, Default)]
-struct Limited {
-    floored: u64,
-    capped: u64,
-    longest_reach: f32,
-}
-
-impl Limited {
-    fn and(self, other: Self) -> Self {
-        Self {
-            floored: self.floored + other.floored,
-            capped: self.capped + other.capped,
-            longest_reach: self.longest_reach.max(other.longest_reach),
-        }
-    }
-}
-
 impl PhotonMap {
     /// Prepares photons; the same photons give the same map.
-    pub fn new<P: Copy + Into<Photon> + Sync>(photons: &[P], limits: FootprintLimits, parts: MapParts) -> Self {
-        let transform =
-            |p: &Photon| FilterTransform::new(p.footprint, p.normal, limits.scale, limits.floor, limits.ceiling);
-        let overlap = parts.overlap.then(|| {
-            let bounds = |p: &P| {
-                let p: Photon = (*p).into();
-                (p.position, transform(&p).half_extent)
-            };
-            OverlapTree::new(&photons.par_iter().map(bounds).collect::<Vec<_>>())
-        });
+    pub fn new<P: Footprinted>(photons: &[P], limits: FootprintLimits, parts: MapParts) -> Self {
+        let FootprintLimits { scale, floor, ceiling } = limits;
+        let count = photons.len();
         // In the order of the overlap structure, so that those that are gathered together lie together.
-        let stored = |i: usize| -> Photon {
-            let place = overlap.as_ref().map_or(i, |tree| tree.order()[i] as usize);
-            photons[place].into()
-        };
-        let mut ready = vec![MapPhoton::NONE; photons.len()];
-        let fill = |(chunk, places): (usize, &mut [MapPhoton])| {
-            let mut limited = Limited::default();
-            for (i, place) in places.iter_mut().enumerate() {
-                let p = stored(chunk * CHUNK + i);
-                // Made a second time rather than kept: it is larger than the photon.
-                let t = transform(&p);
-                limited.floored += u64::from(t.floored);
-                limited.capped += u64::from(t.capped);
-                limited.longest_reach = limited.longest_reach.max(t.reach);
-                *place = MapPhoton::new(&p, &t);
+        let order = parts.overlap.then(|| {
+            let size = |p: &P| (p.size() * scale).max(floor).min(ceiling);
+            packing_order(photons, |p| (p.position(), size(p)))
+        });
+        let (floored, capped) = (AtomicU64::new(0), AtomicU64::new(0));
+        let group = |group: usize| {
+            // Read all at once: they lie anywhere, and the processor waits for all of them together. A group that is not
+            // full has its last photon more than once.
+            let stored: [P; LANES] = std::array::from_fn(|lane| {
+                let i = (group * LANES + lane).min(count - 1);
+                photons[order.as_ref().map_or(i, |order| order[i] as usize)]
+            });
+            let mut ready = [MapPhoton::NONE; LANES];
+            let mut boxes = [(Vec3::ZERO, Vec3::ZERO); LANES];
+            let mut bounded = (0, 0);
+            let own = LANES.min(count - group * LANES);
+            for (lane, &p) in stored[..own].iter().enumerate() {
+                let p: Photon = p.into();
+                let t = FilterTransform::new(p.footprint, p.normal, scale, floor, ceiling);
+                bounded = (bounded.0 + u64::from(t.floored), bounded.1 + u64::from(t.capped));
+                ready[lane] = MapPhoton::new(&p, &t);
+                boxes[lane] = (p.position, t.half_extent);
             }
-            limited
+            // Sums of whole numbers do not depend on the order; most groups have none.
+            for (sum, own) in [(&floored, bounded.0), (&capped, bounded.1)] {
+                if own > 0 {
+                    sum.fetch_add(own, Ordering::Relaxed);
+                }
+            }
+            (ready, Block::of(boxes.into_iter().take(own)))
         };
-        let limited = ready.par_chunks_mut(CHUNK).enumerate().map(fill).reduce(Limited::default, Limited::and);
-        let kd_tree = parts.kd_tree.then(|| KdTree::new(ready.iter().map(|p| p.position)));
-        let Limited { floored, capped, longest_reach } = limited;
+        let groups = (0..count.div_ceil(LANES)).into_par_iter();
+        let mut ready: Vec<[MapPhoton; LANES]> = Vec::new();
+        let overlap = match &order {
+            Some(_) => {
+                let mut blocks = OverlapTree::room(count);
+                groups.map(group).unzip_into_vecs(&mut ready, &mut blocks);
+                Some(blocks)
+            }
+            None => {
+                groups.map(|g| group(g).0).collect_into_vec(&mut ready);
+                None
+            }
+        };
+        let overlap = order.zip(overlap).map(|(order, blocks)| OverlapTree::over(order, blocks));
+        let mut ready = ready.into_flattened();
+        ready.truncate(count);
+        let kd_tree = parts
+            .kd_tree
+            .then(|| KdTree::of(ready.par_iter().zip(0..count as u32).map(|(p, i)| (p.position, i)).collect()));
+        // Not less than any, although inverses are rounded.
+        let least = ready.par_iter().map(|p| p.inverse_reach).reduce(|| f32::INFINITY, f32::min);
+        let longest_reach = if count > 0 { (1.0 + 2.0 * f32::EPSILON) / least } else { 0.0 };
+        let (floored, capped) = (floored.into_inner(), capped.into_inner());
         Self { photons: ready, kd_tree, overlap, longest_reach, floored, capped }
     }
 

@@ -4,7 +4,9 @@ use crate::math::frame::tangents;
 use crate::math::octahedron::Octahedral;
 use crate::math::rgb::Rgb;
 use glam::Vec3;
+use rayon::prelude::*;
 use serde::Serialize;
+use std::ops::Range;
 
 /// What a photon has been through before it was stored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -58,6 +60,36 @@ pub struct StoredPhoton {
     footprint: [f32; 4],
     direction: Octahedral,
     normal: Octahedral,
+}
+
+/// A photon, stored or not, that a map can be made of.
+pub trait Footprinted: Copy + Sync + Into<Photon> {
+    /// Where it arrived, metres.
+    fn position(&self) -> Vec3;
+
+    /// About the longest semi-axis of its footprint at scale 1, metres: from that to √2 of it.
+    fn size(&self) -> f32;
+}
+
+impl Footprinted for Photon {
+    fn position(&self) -> Vec3 {
+        self.position
+    }
+
+    fn size(&self) -> f32 {
+        let [a, b] = self.footprint;
+        (a.length_squared() + b.length_squared()).sqrt()
+    }
+}
+
+impl Footprinted for StoredPhoton {
+    fn position(&self) -> Vec3 {
+        self.position
+    }
+
+    fn size(&self) -> f32 {
+        self.footprint.iter().map(|x| x * x).sum::<f32>().sqrt()
+    }
 }
 
 impl From<Photon> for StoredPhoton {
@@ -125,10 +157,30 @@ impl StoredPhotons {
         PhotonKind::ALL.into_iter().for_each(|kind| self.of_mut(kind).clear());
     }
 
-    /// Puts all of `other` at the end of these.
-    pub fn append(&mut self, other: &Self) {
-        PhotonKind::ALL.into_iter().for_each(|kind| self.of_mut(kind).extend_from_slice(other.of(kind)));
+    /// The photons of several, one after the other.
+    pub fn joined(parts: &[&Self]) -> Self {
+        let of = |kind| joined(&parts.iter().map(|part| part.of(kind)).collect::<Vec<_>>());
+        Self { direct: of(PhotonKind::Direct), caustic: of(PhotonKind::Caustic), global: of(PhotonKind::Global) }
     }
+}
+
+/// Lists in one, made on all threads.
+fn joined(lists: &[&[StoredPhoton]]) -> Vec<StoredPhoton> {
+    let ends: Vec<usize> = lists
+        .iter()
+        .scan(0, |end, list| {
+            *end += list.len();
+            Some(*end)
+        })
+        .collect();
+    let of = |at: &mut (Range<usize>, usize), i: usize| {
+        if !at.0.contains(&i) {
+            let list = ends.partition_point(|end| *end <= i);
+            *at = (ends[list] - lists[list].len()..ends[list], list);
+        }
+        lists[at.1][i - at.0.start]
+    };
+    (0..ends.last().copied().unwrap_or(0)).into_par_iter().map_init(|| (0..0, 0), of).collect()
 }
 
 #[cfg(test)]
@@ -136,6 +188,21 @@ mod tests {
     use super::*;
     use crate::math::frame::uniform_sphere;
     use crate::math::sequence::{Sampling, Sequence};
+
+    /// Lists of any length, none among them, end up one after the other.
+    #[test]
+    fn lists_are_joined_in_order() {
+        let photon = |i: usize| {
+            let position = Vec3::X * i as f32;
+            Photon { position, direction: Vec3::X, normal: Vec3::X, power: Rgb::ONE, footprint: [Vec3::ZERO; 2] }.into()
+        };
+        let all: Vec<StoredPhoton> = (0..30_000).map(photon).collect();
+        let cuts = [0, 0, 1, 5, 5, 9_000, 29_999, 30_000, 30_000];
+        let lists: Vec<&[StoredPhoton]> = cuts.windows(2).map(|w| &all[w[0]..w[1]]).collect();
+        let places = |list: &[StoredPhoton]| list.iter().map(|p| p.position.x).collect::<Vec<_>>();
+        assert_eq!(places(&joined(&lists)), places(&all));
+        assert!(joined(&[]).is_empty() && joined(&[&[]]).is_empty());
+    }
 
     /// What comes back of many photons, on walls along the axes and of any slope.
     #[test]

@@ -83,14 +83,10 @@ impl Emitter<'_> {
                 part.taken()
             })
             .collect();
-        let mut whole = PhotonPass::default();
-        for kind in PhotonKind::ALL {
-            // Once and exactly: a list that grows by doubling may take twice what it holds.
-            whole.stored.of_mut(kind).reserve_exact(parts.iter().map(|p| p.stored.of(kind).len()).sum());
-        }
+        let stored = StoredPhotons::joined(&parts.iter().map(|part| &part.stored).collect::<Vec<_>>());
+        let mut whole = PhotonPass { stored, ..Default::default() };
         for part in parts {
             whole.chunks.push(PhotonKind::ALL.map(|kind| part.stored.of(kind).len() as u32));
-            whole.stored.append(&part.stored);
             whole.emitted += part.emitted;
             whole.counts += part.counts;
             whole.cut_off += part.cut_off;

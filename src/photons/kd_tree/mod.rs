@@ -147,8 +147,15 @@ impl KdTree {
 
     /// The same with leaves of `leaf` entries at most, one or more. What a query finds does not depend on it.
     pub fn with_leaves(positions: impl Iterator<Item = Vec3>, leaf: usize) -> Self {
-        let leaf = leaf.max(1);
-        let mut entries: Vec<(Vec3, u32)> = positions.zip(0u32..).collect();
+        Self::over(positions.zip(0u32..).collect(), leaf.max(1))
+    }
+
+    /// Builds over positions with the indices that they are reported as.
+    pub fn of(entries: Vec<(Vec3, u32)>) -> Self {
+        Self::over(entries, LEAF)
+    }
+
+    fn over(mut entries: Vec<(Vec3, u32)>, leaf: usize) -> Self {
         let count = node_count(entries.len(), leaf);
         let mut nodes = vec![Node { split: 0.0, axis: IS_LEAF, start: 0, count: 0 }; count];
         if !entries.is_empty() {

@@ -1,7 +1,8 @@
 //! The order in which boxes are packed: by size, and among those of like size along Hilbert's curve.
 
-use super::Bounds;
+use super::LANES;
 use glam::Vec3;
+use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
 /// Steps along each axis, as bits.
@@ -10,51 +11,96 @@ const BITS: u32 = 18;
 /// Sizes within a factor of two to the power of this many are alike.
 const LIKE: u32 = 2;
 
+/// The order in which entries are packed, `of` giving the centre of each and the longest half-side of its box.
+pub(in crate::photons) fn packing_order<T: Sync>(entries: &[T], of: impl Fn(&T) -> (Vec3, f32) + Sync) -> Vec<u32> {
+    let Some(last) = entries.last() else { return Vec::new() };
+    let curve = Curve::around(entries.par_iter().map(|e| of(e).0));
+    let keys = |(group, chunk): (usize, &[T])| {
+        // A group that is not full has its last entry more than once, and too many keys.
+        let keys = curve.keys(std::array::from_fn(|lane| of(chunk.get(lane).unwrap_or(last))));
+        std::array::from_fn(|lane| (keys[lane], (group * LANES + lane) as u32))
+    };
+    let keys: Vec<[(u64, u32); LANES]> = entries.par_chunks(LANES).enumerate().map(keys).collect();
+    let mut keys = keys.into_flattened();
+    keys.truncate(entries.len());
+    keys.par_sort_unstable();
+    keys.par_iter().map(|&(_, i)| i).collect()
+}
+
 /// The cube that the curve fills.
-pub(super) struct Curve {
+struct Curve {
     low: Vec3,
     scale: f32,
 }
 
 impl Curve {
-    /// Around the centres of boxes.
-    pub(super) fn around(boxes: &[Bounds]) -> Self {
+    /// Around centres.
+    fn around(centers: impl ParallelIterator<Item = Vec3>) -> Self {
         let ends = (Vec3::INFINITY, Vec3::NEG_INFINITY);
         let join = |a: (Vec3, Vec3), b: (Vec3, Vec3)| (a.0.min(b.0), a.1.max(b.1));
-        let (low, high) = boxes.par_iter().fold(|| ends, |all, b| join(all, (b.0, b.0))).reduce(|| ends, join);
+        let (low, high) = centers.fold(|| ends, |all, c| join(all, (c, c))).reduce(|| ends, join);
         let side = (high - low).max_element();
         Self { low, scale: if side > 0.0 { (1 << BITS) as f32 * (1.0 - f32::EPSILON) / side } else { 0.0 } }
     }
 
-    /// Where a box comes: its size above, its place on the curve below.
-    pub(super) fn key(&self, (center, half): &Bounds) -> u64 {
-        let size = half.max_element().to_bits() >> 23 & 0xff;
+    /// Where boxes come: their size above, their place on the curve below.
+    fn keys(&self, boxes: [(Vec3, f32); LANES]) -> [u64; LANES] {
         // A cast saturates.
-        let steps = ((*center - self.low) * self.scale).to_array().map(|x| (x as u32).min((1 << BITS) - 1));
-        u64::from(size / LIKE) << (3 * BITS) | hilbert(steps)
+        let step = |x: f32| (x as u32).min((1 << BITS) - 1);
+        let places = boxes.map(|(center, _)| ((center - self.low) * self.scale).to_array().map(step));
+        let steps = std::array::from_fn(|axis| std::array::from_fn(|lane| places[lane][axis]));
+        let along = Arch::new().dispatch(Hilbert { steps });
+        let class = |lane: usize| (boxes[lane].1.to_bits() >> 23 & 0xff) / LIKE;
+        std::array::from_fn(|lane| u64::from(class(lane)) << (3 * BITS) | along[lane])
     }
 }
 
-/// Place on Hilbert's curve of a point of the grid (Skilling 2004).
-fn hilbert(mut x: [u32; 3]) -> u64 {
-    for bit in (1..BITS).rev() {
-        let below = (1 << bit) - 1;
-        for axis in 0..3 {
-            if x[axis] >> bit & 1 == 1 {
-                x[0] ^= below;
-            } else {
-                let swapped = (x[0] ^ x[axis]) & below;
-                x[0] ^= swapped;
-                x[axis] ^= swapped;
+/// Places on Hilbert's curve of eight points of the grid at once, by coordinates (Skilling 2004).
+struct Hilbert {
+    steps: [[u32; LANES]; 3],
+}
+
+impl WithSimd for Hilbert {
+    type Output = [u64; LANES];
+
+    #[inline(always)]
+    fn with_simd<I: Simd>(self, _: I) -> [u64; LANES] {
+        let mut x = self.steps;
+        for bit in (1..BITS).rev() {
+            let below = (1 << bit) - 1;
+            for axis in 0..3 {
+                for lane in 0..LANES {
+                    // All bits if this one is set: both ways are taken, and one of them changes nothing.
+                    let set = 0u32.wrapping_sub(x[axis][lane] >> bit & 1);
+                    let swapped = (x[0][lane] ^ x[axis][lane]) & below & !set;
+                    x[0][lane] ^= below & set | swapped;
+                    x[axis][lane] ^= swapped;
+                }
             }
         }
+        let mut keys = [0; LANES];
+        for (lane, key) in keys.iter_mut().enumerate() {
+            // Gray's code, undone.
+            let b = x[1][lane] ^ x[0][lane];
+            let c = x[2][lane] ^ b;
+            let mut turn = 0;
+            for bit in 1..BITS {
+                turn ^= 0u32.wrapping_sub(c >> bit & 1) & ((1 << bit) - 1);
+            }
+            *key = apart(x[0][lane] ^ turn) << 2 | apart(b ^ turn) << 1 | apart(c ^ turn);
+        }
+        keys
     }
-    // Gray's code, undone.
-    x[1] ^= x[0];
-    x[2] ^= x[1];
-    let turn = (1..BITS).rev().filter(|bit| x[2] >> bit & 1 == 1).fold(0, |t, bit| t ^ ((1 << bit) - 1));
-    let x = x.map(|v| v ^ turn);
-    (0..BITS).rev().fold(0, |key, bit| x.iter().fold(key, |key, v| key << 1 | u64::from(v >> bit & 1)))
+}
+
+/// The bits of a number of [`BITS`] of them, each three places from the next.
+#[inline(always)]
+fn apart(x: u32) -> u64 {
+    let x = u64::from(x);
+    let x = (x | x << 16) & 0x0003_0000_ff00_00ff;
+    let x = (x | x << 8) & 0x0003_00f0_0f00_f00f;
+    let x = (x | x << 4) & 0x00c3_0c30_c30c_30c3;
+    (x | x << 2) & 0x0249_2492_4924_9249
 }
 
 #[cfg(test)]
@@ -65,8 +111,13 @@ mod tests {
     #[test]
     fn the_curve_goes_from_neighbour_to_neighbour() {
         // The first 512 places of the curve are a cube of eight.
-        let mut points: Vec<(u64, [u32; 3])> =
-            (0..512u32).map(|i| [i & 7, i >> 3 & 7, i >> 6]).map(|p| (hilbert(p), p)).collect();
+        let row = |i: u32| [[0, 1, 2, 3, 4, 5, 6, 7], [i & 7; LANES], [i >> 3; LANES]];
+        let keys = |steps: [[u32; LANES]; 3]| {
+            let keys = Arch::new().dispatch(Hilbert { steps });
+            std::array::from_fn(|lane| (keys[lane], steps.map(|s| s[lane])))
+        };
+        let rows: Vec<[(u64, [u32; 3]); LANES]> = (0..64).map(row).map(keys).collect();
+        let mut points = rows.into_flattened();
         points.sort_unstable();
         assert!(points.iter().map(|(key, _)| *key).eq(0..512));
         for pair in points.windows(2) {

@@ -8,14 +8,14 @@
 mod curve;
 mod walk;
 
-use curve::Curve;
+pub(super) use curve::packing_order;
 use glam::Vec3;
 use pulp::Arch;
 use rayon::prelude::*;
 use walk::{DEEPEST, Walk};
 
 /// Boxes that are tested at once.
-const LANES: usize = 8;
+pub(super) const LANES: usize = 8;
 
 /// Memory of one entry: its box, its share of the boxes above, and its place in the order.
 pub const BYTES_PER_ENTRY: usize = 28 + size_of::<u32>();
@@ -26,14 +26,19 @@ type Bounds = (Vec3, Vec3);
 /// Eight boxes: their least and largest coordinates along each axis. An empty one is met by nothing.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
-struct Block {
+pub(super) struct Block {
     low: [[f32; LANES]; 3],
     high: [[f32; LANES]; 3],
 }
 
 impl Block {
-    /// Of eight boxes or fewer, by their corners.
-    fn of(boxes: impl Iterator<Item = (Vec3, Vec3)>) -> Self {
+    /// Of eight boxes or fewer, by their centres and half-sizes.
+    pub(super) fn of(boxes: impl Iterator<Item = Bounds>) -> Self {
+        Self::around_all(boxes.map(corners))
+    }
+
+    /// The same by corners.
+    fn around_all(boxes: impl Iterator<Item = (Vec3, Vec3)>) -> Self {
         let mut block = Self { low: [[f32::INFINITY; LANES]; 3], high: [[f32::NEG_INFINITY; LANES]; 3] };
         for (lane, (low, high)) in boxes.take(LANES).enumerate() {
             for axis in 0..3 {
@@ -69,23 +74,28 @@ pub struct OverlapTree {
 impl OverlapTree {
     /// Builds over boxes given as centre and half-size.
     pub fn new(boxes: &[(Vec3, Vec3)]) -> Self {
-        if boxes.is_empty() {
+        let order = packing_order(boxes, |(center, half)| (*center, half.max_element()));
+        let mut blocks = Self::room(order.len());
+        let of_entries = |entries: &[u32]| Block::of(entries.iter().map(|&i| boxes[i as usize]));
+        order.par_chunks(LANES).map(of_entries).collect_into_vec(&mut blocks);
+        Self::over(order, blocks)
+    }
+
+    /// An empty list with room for the blocks of all levels over so many entries: a seventh more than the lowest, and one
+    /// for each level that is not full.
+    pub(super) fn room(entries: usize) -> Vec<Block> {
+        Vec::with_capacity(entries / (LANES - 1) + DEEPEST)
+    }
+
+    /// Builds over the blocks of entries in their order, which is that of [`packing_order`].
+    pub(super) fn over(order: Vec<u32>, mut blocks: Vec<Block>) -> Self {
+        if blocks.is_empty() {
             return Self::default();
         }
-        let curve = Curve::around(boxes);
-        let mut keys: Vec<(u64, u32)> =
-            boxes.par_iter().zip(0..boxes.len() as u32).map(|(b, i)| (curve.key(b), i)).collect();
-        keys.par_sort_unstable();
-        let order: Vec<u32> = keys.par_iter().map(|&(_, i)| i).collect();
-        drop(keys);
-        // All levels: a seventh more than the lowest, and one for each that is not full.
-        let mut blocks = Vec::with_capacity(order.len() / (LANES - 1) + DEEPEST);
-        let of_entries = |entries: &[u32]| Block::of(entries.iter().map(|&i| corners(boxes[i as usize])));
-        order.par_chunks(LANES).map(of_entries).collect_into_vec(&mut blocks);
         let mut levels = vec![0];
         while blocks.len() - levels[levels.len() - 1] as usize > 1 {
             let below = levels[levels.len() - 1] as usize;
-            let of_blocks = |children: &[Block]| Block::of(children.iter().map(Block::around));
+            let of_blocks = |children: &[Block]| Block::around_all(children.iter().map(Block::around));
             let next: Vec<Block> = blocks[below..].par_chunks(LANES).map(of_blocks).collect();
             levels.push(blocks.len() as u32);
             blocks.extend(next);
