@@ -3,7 +3,8 @@
 #![allow(clippy::expect_used, missing_docs, reason = "a failed expectation is how this program reports")]
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
-use cusp::estimate::polygon::{integral_over_polygon, mean_over_parallelogram};
+use cusp::estimate::parallelogram::mean_over_parallelogram;
+use cusp::estimate::polygon::integral_over_polygon;
 use cusp::estimate::registry::{estimator, estimators};
 use cusp::estimate::{Estimator, Gathered, View};
 use cusp::math::angle::angle;
@@ -12,6 +13,7 @@ use cusp::photons::irradiance::surface_area::SurfaceAreas;
 use cusp::photons::irradiance::{GlobalPhotons, IrradiancePyramid, PyramidSettings};
 use cusp::photons::kd_tree::Nearest;
 use cusp::photons::map::{FootprintLimits, MapParts, Query};
+use cusp::photons::overlap::Near;
 use cusp::photons::{PhotonKind, PhotonMap, StoredPhoton};
 use cusp::render::Silent;
 use cusp::render::film::{Film, Rect};
@@ -64,14 +66,14 @@ fn gather_and_estimate(c: &mut Criterion) {
     group.bench_function("overlap_point", |b| {
         b.iter(|| {
             found.clear();
-            views.iter().for_each(|v| map.overlapping_point(&v.query, &mut found));
+            views.iter().for_each(|v| map.overlapping_point(&v.query, &Near::default(), &mut found));
             found.len()
         });
     });
     group.bench_function("overlap_parallelogram", |b| {
         b.iter(|| {
             found.clear();
-            views.iter().for_each(|v| map.overlapping_parallelogram(&v.query, &mut found));
+            views.iter().for_each(|v| map.overlapping_parallelogram(&v.query, &Near::default(), &mut found));
             found.len()
         });
     });

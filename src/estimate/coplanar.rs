@@ -8,7 +8,8 @@
 use super::{Construction, Estimator, Gathered, Lookup, SamplingPoint, View, weighted_sum};
 use crate::estimate::clip::{self, ClippedPolygon, HalfPlane, MAX_CORNERS, MAX_VERTICES};
 use crate::estimate::kernel::silverman;
-use crate::estimate::polygon::{mean_over_parallelogram, mean_over_part};
+use crate::estimate::parallelogram::mean_over_parallelogram;
+use crate::estimate::polygon::mean_over_part;
 use crate::estimate::settings::{Spec, SpecError};
 use crate::photons::MapPhoton;
 use glam::{DVec2, DVec3, Vec3};

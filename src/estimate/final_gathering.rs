@@ -281,6 +281,10 @@ impl Estimator for WithFinalGathering {
         self.inner.irradiance(gathered, view)
     }
 
+    fn irradiances<'a>(&self, hits: &mut dyn Iterator<Item = (Gathered<'a>, View)>, put: &mut dyn FnMut(DVec3)) {
+        self.inner.irradiances(hits, put);
+    }
+
     fn construction(&self, photon: &MapPhoton, view: &View) -> Construction {
         self.inner.construction(photon, view)
     }

@@ -8,6 +8,7 @@ pub mod final_gathering;
 pub mod integrated;
 pub mod kernel;
 pub mod multi_sampled;
+pub mod parallelogram;
 pub mod polygon;
 pub mod registry;
 pub mod regular;
@@ -91,6 +92,14 @@ pub trait Estimator: Send + Sync {
 
     /// Irradiance of each channel, W/m²: the sum of powers times weights, which f64 can always hold.
     fn irradiance(&self, gathered: &Gathered, view: &View) -> DVec3;
+
+    /// [`Estimator::irradiance`] of many hits, to the bit; `put` gets those of all in their order. For an estimator that
+    /// takes photons together whichever hit they belong to.
+    fn irradiances<'a>(&self, hits: &mut dyn Iterator<Item = (Gathered<'a>, View)>, put: &mut dyn FnMut(DVec3)) {
+        for (gathered, view) in hits {
+            put(self.irradiance(&gathered, &view));
+        }
+    }
 
     /// What it does with one photon, as plain geometry; nothing by default.
     fn construction(&self, _photon: &MapPhoton, _view: &View) -> Construction {

@@ -179,7 +179,7 @@ impl Estimator for MultiSampled {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::estimate::polygon::mean_over_parallelogram;
+    use crate::estimate::parallelogram::mean_over_parallelogram;
     use proptest::prelude::*;
 
     fn plain(n: u32, grid: Grid, c: Vec3, a: Vec3, b: Vec3) -> f64 {

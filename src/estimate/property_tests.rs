@@ -6,6 +6,7 @@ use crate::estimate::registry::{ESTIMATORS, estimator};
 use crate::estimate::{Estimator, Gathered, Lookup, View};
 use crate::math::rgb::Rgb;
 use crate::photons::map::{FootprintLimits, MapParts, Query};
+use crate::photons::overlap::Near;
 use crate::photons::{MapPhoton, Photon, PhotonMap};
 use glam::{DVec2, Quat, Vec3};
 use proptest::prelude::*;
@@ -169,6 +170,28 @@ proptest! {
         }
     }
 
+    /// Hits together are each alone, to the bit: with all photons, with some and with none.
+    #[test]
+    fn hits_together_are_each_alone(pairs in prop::collection::vec(pair(), 1..40), cuts in prop::collection::vec(0usize..80, 1..90)) {
+        let photons: Vec<Photon> = pairs.iter().map(|p| p.photon).collect();
+        let map = map_of(&photons, 1.0);
+        let indices: Vec<u32> = (0..photons.len() as u32).collect();
+        let hits: Vec<(Gathered, View)> = cuts
+            .iter()
+            .zip(pairs.iter().cycle())
+            .map(|(cut, p)| {
+                let indices = &indices[..(*cut).min(indices.len())];
+                (Gathered { photons: map.photons(), indices, radius: p.radius }, p.view)
+            })
+            .collect();
+        for e in all() {
+            let mut together = Vec::new();
+            e.irradiances(&mut hits.iter().copied(), &mut |sum| together.push(sum));
+            let alone: Vec<glam::DVec3> = hits.iter().map(|(found, view)| e.irradiance(found, view)).collect();
+            prop_assert_eq!(together, alone, "{}", e.name());
+        }
+    }
+
     /// The view footprint's part in the photon's parallelogram is the photon's part in the view's.
     #[test]
     fn clipping_is_symmetric(
@@ -238,7 +261,7 @@ proptest! {
         nearest.sort_unstable();
         prop_assert_eq!(found, nearest);
         let mut overlapping = Vec::new();
-        map.overlapping_parallelogram(&query, &mut overlapping);
+        map.overlapping_parallelogram(&query, &Near::default(), &mut overlapping);
         let integrated = estimator("integrated").expect("registered");
         for i in &lit {
             let photon = &map.photons()[*i as usize];

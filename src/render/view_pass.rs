@@ -8,6 +8,7 @@ use crate::math::hash::mix;
 use crate::math::rgb::{Rgb, in_f32};
 use crate::math::sequence::{Sampling, Sequence};
 use crate::photons::kd_tree::Nearest;
+use crate::photons::overlap::Near;
 use crate::photons::{PhotonKind, PhotonMap};
 use crate::render::film::{Image, Rect};
 use crate::render::flat_pixels::FlatPixels;
@@ -169,6 +170,9 @@ pub trait TileWatch: Sync {
 /// Photons that are gathered before they are estimated; a hit's own may exceed it.
 const BATCH: usize = 1 << 20;
 
+/// Hits in a row that look photons up together: neighbours see nearly the same ones.
+const NEAR: usize = 8;
+
 /// Buffers that a thread keeps from tile to tile.
 #[derive(Default)]
 pub(super) struct Scratch {
@@ -180,6 +184,10 @@ pub(super) struct Scratch {
     spans: Vec<(usize, usize, f32)>,
     /// The nearest photons of each map, which the search for the next hit starts from.
     nearest: [Nearest; PhotonKind::ALL.len()],
+    /// Of each hit of a batch, from all maps.
+    irradiances: Vec<DVec3>,
+    /// What the next hits have in common in each map.
+    near: [Near; PhotonKind::ALL.len()],
     gather: GatherScratch,
 }
 
@@ -291,6 +299,7 @@ impl ViewPass<'_> {
         let half = 0.5 / (n as f32 * cells);
         let mut base = vec![DVec3::ZERO; (rect.width * rect.height) as usize];
         scratch.hits.clear();
+        scratch.near.iter_mut().for_each(Near::clear);
         for (pixel, sum) in base.iter_mut().enumerate() {
             let x = rect.x + pixel as u32 % rect.width;
             let y = rect.y + pixel as u32 / rect.width;
@@ -366,17 +375,28 @@ impl ViewPass<'_> {
             gathered += scratch.indices.len() as u64;
 
             let start = Instant::now();
-            let mut spans = scratch.spans.iter();
-            for hit in &scratch.hits[first..next] {
-                let mut irradiance = DVec3::ZERO;
-                let mut own = hit.view;
-                let seen = hit.seen(slot.estimator, &mut own);
-                let maps = self.maps.of_estimator(slot.estimator);
-                for ((_, map), &(from, to, radius)) in maps.zip(spans.by_ref()) {
-                    let found = Gathered { photons: map.photons(), indices: &scratch.indices[from..to], radius };
-                    irradiance += slot.estimator.irradiance(&found, seen);
-                }
-                sums[hit.pixel as usize] += irradiance * hit.weight.as_dvec3();
+            let hits = &scratch.hits[first..next];
+            scratch.irradiances.clear();
+            scratch.irradiances.resize(hits.len(), DVec3::ZERO);
+            let maps = self.maps.of_estimator(slot.estimator).count();
+            for (number, (_, map)) in self.maps.of_estimator(slot.estimator).enumerate() {
+                // Most hits find nothing in most scenes.
+                let spans = || scratch.spans.iter().skip(number).step_by(maps);
+                let found = |&&(from, to, _): &&(usize, usize, f32)| from < to;
+                let mut gathered = hits.iter().zip(spans()).filter(|(_, span)| found(span)).map(|(hit, span)| {
+                    let &(from, to, radius) = span;
+                    let indices = &scratch.indices[from..to];
+                    (Gathered { photons: map.photons(), indices, radius }, hit.seen_by(slot.estimator))
+                });
+                let mut sums = scratch.irradiances.iter_mut().zip(spans()).filter(|(_, span)| found(span));
+                slot.estimator.irradiances(&mut gathered, &mut |irradiance| {
+                    if let Some((sum, _)) = sums.next() {
+                        *sum += irradiance;
+                    }
+                });
+            }
+            for (hit, irradiance) in hits.iter().zip(&scratch.irradiances) {
+                sums[hit.pixel as usize] += *irradiance * hit.weight.as_dvec3();
             }
             seconds.estimate += start.elapsed().as_secs_f64();
         }
@@ -458,6 +478,16 @@ impl ViewPass<'_> {
         let mut own = scratch.hits[hit].view;
         let query = scratch.hits[hit].seen(slot.estimator, &mut own).query;
         let (indices, nearest) = (&mut scratch.indices, &mut scratch.nearest[kind as usize]);
+        let near = &mut scratch.near[kind as usize];
+        if slot.gather == Gather::Overlap {
+            let next = scratch.hits[hit..].iter().take(NEAR);
+            let seen = next.map(|hit| hit.seen_by(slot.estimator).query);
+            match slot.estimator.lookup() {
+                Lookup::Point => map.gather_near(seen.map(|query| at_point(&query)), near),
+                Lookup::Parallelogram => map.gather_near(seen, near),
+                Lookup::Disc => {}
+            }
+        }
         let k = self.tracer.settings.k;
         match (slot.estimator.lookup(), slot.gather) {
             (Lookup::Disc, _) => {
@@ -467,8 +497,8 @@ impl ViewPass<'_> {
                 let radius = (f32::from_bits(bits) * self.area_factor).sqrt();
                 return radius.max(self.tracer.scene.resolution());
             }
-            (Lookup::Point, Gather::Overlap) => map.overlapping_point(&query, indices),
-            (Lookup::Parallelogram, Gather::Overlap) => map.overlapping_parallelogram(&query, indices),
+            (Lookup::Point, Gather::Overlap) => map.overlapping_point(&query, near, indices),
+            (Lookup::Parallelogram, Gather::Overlap) => map.overlapping_parallelogram(&query, near, indices),
             (Lookup::Point, Gather::Knn) => map.nearest(&at_point(&query), k, nearest, indices),
             (Lookup::Parallelogram, Gather::Knn) => map.nearest(&query, k, nearest, indices),
         }

@@ -5,7 +5,8 @@ use super::oracle::footprint::{largest_mean, mean_over};
 use super::oracle::random::Random;
 use super::oracle::scan::kernel_over;
 use super::{Case, Outcome};
-use crate::estimate::polygon::{integral_over_polygon, mean_over_parallelogram};
+use crate::estimate::parallelogram::mean_over_parallelogram;
+use crate::estimate::polygon::integral_over_polygon;
 use glam::{DVec2, DVec3, Vec3};
 
 /// The group.

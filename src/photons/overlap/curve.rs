@@ -64,6 +64,7 @@ impl WithSimd for Hilbert {
     type Output = [u64; LANES];
 
     #[inline(always)]
+    #[expect(clippy::needless_range_loop, reason = "a lane of two axes, which may be the same")]
     fn with_simd<I: Simd>(self, _: I) -> [u64; LANES] {
         let mut x = self.steps;
         for bit in (1..BITS).rev() {
@@ -97,6 +98,7 @@ impl WithSimd for Hilbert {
 #[inline(always)]
 fn apart(x: u32) -> u64 {
     let x = u64::from(x);
+    let x = (x | x << 32) & 0x0003_0000_0000_ffff;
     let x = (x | x << 16) & 0x0003_0000_ff00_00ff;
     let x = (x | x << 8) & 0x0003_00f0_0f00_f00f;
     let x = (x | x << 4) & 0x00c3_0c30_c30c_30c3;
@@ -107,22 +109,33 @@ fn apart(x: u32) -> u64 {
 mod tests {
     use super::*;
 
-    /// All points of a small cube come one after the other, each a step away from the last, and fill it.
+    /// All points of a small cube come one after the other, each a step away from the last, and fill it; and so do the
+    /// parts of the whole cube, as many along each side.
     #[test]
     fn the_curve_goes_from_neighbour_to_neighbour() {
-        // The first 512 places of the curve are a cube of eight.
-        let row = |i: u32| [[0, 1, 2, 3, 4, 5, 6, 7], [i & 7; LANES], [i >> 3; LANES]];
-        let keys = |steps: [[u32; LANES]; 3]| {
-            let keys = Arch::new().dispatch(Hilbert { steps });
-            std::array::from_fn(|lane| (keys[lane], steps.map(|s| s[lane])))
-        };
-        let rows: Vec<[(u64, [u32; 3]); LANES]> = (0..64).map(row).map(keys).collect();
-        let mut points = rows.into_flattened();
-        points.sort_unstable();
-        assert!(points.iter().map(|(key, _)| *key).eq(0..512));
-        for pair in points.windows(2) {
-            let steps: u32 = (0..3).map(|i| pair[0].1[i].abs_diff(pair[1].1[i])).sum();
-            assert_eq!(steps, 1, "{pair:?}");
+        for above in [0, BITS - 3] {
+            // The first 512 places of the curve are a cube of eight.
+            let row = |i: u32| [[0, 1, 2, 3, 4, 5, 6, 7], [i & 7; LANES], [i >> 3; LANES]];
+            let keys = |steps: [[u32; LANES]; 3]| {
+                let keys = Arch::new().dispatch(Hilbert { steps: steps.map(|s| s.map(|x| x << above)) });
+                std::array::from_fn(|lane| (keys[lane] >> (3 * above), steps.map(|s| s[lane])))
+            };
+            let rows: Vec<[(u64, [u32; 3]); LANES]> = (0..64).map(row).map(keys).collect();
+            let mut points = rows.into_flattened();
+            points.sort_unstable();
+            assert!(points.iter().map(|(key, _)| *key).eq(0..512), "{above}");
+            for pair in points.windows(2) {
+                let steps: u32 = (0..3).map(|i| pair[0].1[i].abs_diff(pair[1].1[i])).sum();
+                assert_eq!(steps, 1, "{above} {pair:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn bits_are_put_apart() {
+        for x in (0..1 << BITS).step_by(77).chain([(1 << BITS) - 1]) {
+            let expected = (0..BITS).map(|bit| u64::from(x >> bit & 1) << (3 * bit)).sum::<u64>();
+            assert_eq!(apart(x), expected);
         }
     }
 }

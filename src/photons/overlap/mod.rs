@@ -12,7 +12,7 @@ pub(super) use curve::packing_order;
 use glam::Vec3;
 use pulp::Arch;
 use rayon::prelude::*;
-use walk::{DEEPEST, Walk};
+use walk::{DEEPEST, Scan, Walk};
 
 /// Boxes that are tested at once.
 pub(super) const LANES: usize = 8;
@@ -57,6 +57,38 @@ impl Block {
             Vec3::from_array(std::array::from_fn(|i| least(&self.low[i]))),
             Vec3::from_array(std::array::from_fn(|i| largest(&self.high[i]))),
         )
+    }
+}
+
+/// Blocks beyond which boxes have too many in common for a list of them to be of use.
+const CROWDED: usize = 256;
+
+/// What queries near each other have in common: the blocks of entries that may meet any of them. The way down through the
+/// tree is gone once for all.
+#[derive(Clone, Debug)]
+pub struct Near {
+    /// The box around them.
+    low: Vec3,
+    high: Vec3,
+    blocks: Vec<u32>,
+    is_crowded: bool,
+}
+
+impl Default for Near {
+    fn default() -> Self {
+        Self { low: Vec3::INFINITY, high: Vec3::NEG_INFINITY, blocks: Vec::new(), is_crowded: false }
+    }
+}
+
+impl Near {
+    /// Forgets for what it was gathered: it must not be used for another tree.
+    pub fn clear(&mut self) {
+        (self.low, self.high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+    }
+
+    /// Whether it was gathered for that box.
+    fn holds(&self, low: Vec3, high: Vec3) -> bool {
+        self.low.cmple(low).all() && self.high.cmpge(high).all()
     }
 }
 
@@ -124,7 +156,48 @@ impl OverlapTree {
     #[inline]
     fn between(&self, low: Vec3, high: Vec3, visit: impl FnMut(u32)) {
         if !self.levels.is_empty() {
-            Arch::new().dispatch(Walk { tree: self, low, high, visit });
+            let mut visit = visit;
+            let visit = |entry| {
+                visit(entry);
+                true
+            };
+            Arch::new().dispatch(Walk { tree: self, low, high, bottom: 0, visit });
+        }
+    }
+
+    /// Finds what boxes that lie near each other have in common, by centres and half-sizes, for
+    /// [`OverlapTree::in_box_near`]; nothing to do if `near` is for the first of them. What is found does not depend on it,
+    /// and if they lie far apart it is of no use.
+    pub fn gather_near(&self, mut boxes: impl Iterator<Item = Bounds>, near: &mut Near) {
+        let Some(first) = boxes.next() else { return };
+        let (low, high) = corners(first);
+        if near.holds(low, high) {
+            return;
+        }
+        let around = |all: (Vec3, Vec3), b: (Vec3, Vec3)| (all.0.min(b.0), all.1.max(b.1));
+        (near.low, near.high) = boxes.map(corners).fold((low, high), around);
+        near.blocks.clear();
+        near.is_crowded = false;
+        if !self.levels.is_empty() {
+            let visit = |block| {
+                near.is_crowded = near.blocks.len() == CROWDED;
+                if !near.is_crowded {
+                    near.blocks.push(block);
+                }
+                !near.is_crowded
+            };
+            Arch::new().dispatch(Walk { tree: self, low: near.low, high: near.high, bottom: 1, visit });
+        }
+    }
+
+    /// The same as [`OverlapTree::in_box`], faster for a box that `near` was gathered for.
+    #[inline]
+    pub fn in_box_near(&self, near: &Near, center: Vec3, half: Vec3, visit: impl FnMut(u32)) {
+        let (low, high) = corners((center, half));
+        if near.is_crowded || !near.holds(low, high) {
+            self.between(low, high, visit);
+        } else {
+            Arch::new().dispatch(Scan { tree: self, among: &near.blocks, low, high, visit });
         }
     }
 }

@@ -49,6 +49,40 @@ fn what_meets_a_box_is_found_once() {
     }
 }
 
+/// Boxes that were looked up together find what each finds alone: those near each other, those far apart, which have too
+/// much in common for a list, and one that nothing was gathered for.
+#[test]
+fn boxes_near_each_other_find_what_each_finds_alone() {
+    let mut crowded = 0;
+    for n in [0u64, 1, 8, 9, 500, 3000, 40_000] {
+        let sequence = Sequence::new(Sampling::Random, n);
+        let place = |i: u64, set: u32, spread: f32| {
+            let x = sequence.four(i, set);
+            (Vec3::new(x[0], x[1], x[2]) * spread, Vec3::splat(0.05 * x[3] * x[3]))
+        };
+        let boxes: Vec<(Vec3, Vec3)> = (0..n).map(|i| place(i, 0, 1.0)).collect();
+        let tree = OverlapTree::new(&boxes);
+        let mut near = Near::default();
+        for group in 0..40 {
+            let spread = [0.02, 0.2, 1.0][group as usize % 3];
+            let own = |i: u64| {
+                let (center, half) = place(group * 8 + i, 1, spread);
+                (place(group, 2, 1.0 - spread).0 + center, half)
+            };
+            near.clear();
+            tree.gather_near((0..7).map(own), &mut near);
+            crowded += u32::from(near.is_crowded);
+            for (center, half) in (0..8).map(own) {
+                let (mut together, mut alone) = (Vec::new(), Vec::new());
+                tree.in_box_near(&near, center, half, |entry| together.push(entry));
+                tree.in_box(center, half, |entry| alone.push(entry));
+                assert_eq!(together, alone, "{n} boxes, group {group}");
+            }
+        }
+    }
+    assert!(crowded > 10);
+}
+
 /// Sizes that no photon has are packed as well, and found.
 #[test]
 fn boxes_without_size_or_with_all_of_it_are_found() {
