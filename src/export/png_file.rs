@@ -26,7 +26,7 @@ fn encode(size: [u32; 2], rgb: &[u8], facts: &[(&str, String)]) -> Result<Vec<u8
     let mut encoder = png::Encoder::new(&mut bytes, size[0], size[1]);
     encoder.set_color(png::ColorType::Rgb);
     encoder.set_depth(png::BitDepth::Eight);
-    encoder.set_compression(png::Compression::High);
+    encoder.set_compression(png::Compression::Balanced);
     for (key, value) in facts {
         encoder.add_itxt_chunk((*key).to_owned(), value.clone())?;
     }

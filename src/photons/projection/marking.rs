@@ -81,14 +81,23 @@ pub(super) enum Marking {
     /// Directions from patches of the light, each with its own cells.
     Directions {
         counts: [u32; 4],
-        /// Angles to the axis at which rows of cells begin, and that at which the last one ends.
-        rows: Vec<f64>,
+        /// Where rows of cells begin, and where the last one ends.
+        rows: Vec<Row>,
         patches: Vec<Patch>,
         /// Added to all distances, metres.
         margin: f64,
     },
     /// Places on the disc of parallel light.
     Disc { center: DVec3, tangents: [DVec3; 2], radius: f64 },
+}
+
+/// A border of rows of cells.
+#[derive(Clone, Copy)]
+pub(super) struct Row {
+    /// Angle to the axis.
+    angle: f64,
+    /// Its sine and cosine.
+    sincos: (f64, f64),
 }
 
 /// A part of a light from which directions are charted by their angle to an axis and their turn about it.
@@ -114,8 +123,9 @@ impl Marking {
     /// That of a light among so many specular surfaces, in a scene of that radius; None for a mesh light that would take
     /// too long, or that has no area.
     pub(super) fn new(light: &Light, surfaces: usize, scene_radius: f64) -> Option<Self> {
-        let rows = |n: u32, angle: &dyn Fn(f64) -> f64| -> Vec<f64> {
-            (0..=n).map(|i| angle(f64::from(i) / f64::from(n))).collect()
+        let rows = |n: u32, angle: &dyn Fn(f64) -> f64| -> Vec<Row> {
+            let row = |angle: f64| Row { angle, sincos: libm::sincos(angle) };
+            (0..=n).map(|i| row(angle(f64::from(i) / f64::from(n)))).collect()
         };
         let sphere = |u: f64| libm::acos(1.0 - 2.0 * u);
         let hemisphere = |u: f64| libm::asin(u.sqrt());
@@ -211,7 +221,7 @@ impl Marking {
         let is_large = match (self, patch) {
             (Self::Directions { rows, .. }, Some(p)) => {
                 let distance = p.center.distance(center) - p.radius;
-                radius > p.radius / 2.0 && radius > distance * LARGE * rows[rows.len() - 1] / rows.len() as f64
+                radius > p.radius / 2.0 && radius > distance * LARGE * rows[rows.len() - 1].angle / rows.len() as f64
             }
             (Self::Disc { radius: whole, .. }, _) => radius > whole * LARGE / f64::from(FINE),
             _ => false,
@@ -250,23 +260,25 @@ impl Marking {
         let (low, high) = (angle - cap, angle + cap);
         // Where a cap is widest about the axis it touches a meridian.
         let widest = libm::acos((libm::cos(angle) / libm::cos(cap)).clamp(-1.0, 1.0));
-        let half_width = |at: f64| {
-            let across = libm::sin(at) * libm::sin(angle);
-            if across < 1e-12 {
-                return PI;
-            }
-            libm::acos(((libm::cos(cap) - libm::cos(at) * libm::cos(angle)) / across).clamp(-1.0, 1.0))
+        let (cap_cos, (sin, cos)) = (libm::cos(cap), libm::sincos(angle));
+        let half_width = |(at_sin, at_cos): (f64, f64)| {
+            let across = at_sin * sin;
+            if across < 1e-12 { PI } else { libm::acos(((cap_cos - at_cos * cos) / across).clamp(-1.0, 1.0)) }
         };
-        let first = rows.partition_point(|r| *r <= low).saturating_sub(1);
-        for row in first..rows.len() - 1 {
-            if rows[row] > high {
+        let first = rows.partition_point(|r| r.angle <= low).saturating_sub(1);
+        let mut from = rows[first].angle.max(low);
+        let mut half_from = half_width(libm::sincos(from));
+        for (row, next) in rows[1..].iter().enumerate().skip(first) {
+            if rows[row].angle > high {
                 break;
             }
-            let (from, to) = (rows[row].max(low), rows[row + 1].min(high));
-            let mut half = half_width(from).max(half_width(to));
+            let (to, at) = if next.angle <= high { (next.angle, next.sincos) } else { (high, libm::sincos(high)) };
+            let half_to = half_width(at);
+            let mut half = half_from.max(half_to);
             if (from..=to).contains(&widest) {
-                half = half.max(half_width(widest));
+                half = half.max(half_width(libm::sincos(widest)));
             }
+            (from, half_from) = (to, half_to);
             let half = (half + MARGIN).min(PI);
             let scale = f64::from(columns) / TAU;
             let (left, right) = (((turn - half) * scale).floor() as i64, ((turn + half) * scale).floor() as i64);

@@ -19,7 +19,7 @@ use marking::{Marking, Marks};
 use rayon::prelude::*;
 
 /// Surfaces that one thread marks at a time.
-const CHUNK: usize = 1024;
+const CHUNK: usize = 256;
 /// More surfaces than this are marked by the cells of a grid that they lie in.
 const MOST_TRIANGLES: usize = 20_000;
 
