@@ -342,7 +342,7 @@ impl<'a> Comparison<'a> {
         let r = &self.renderer;
         let [w, h] = r.settings().size;
         let regular = r.estimators().iter().position(|e| e.id() == "regular").map(|i| r.estimator_seconds()[i].total());
-        let estimators = r.estimators().iter().enumerate().map(|(i, e)| {
+        let estimators = r.estimators().par_iter().enumerate().map(|(i, e)| {
             let parts = r.estimator_seconds()[i];
             EstimatorReport {
                 id: e.id().into(),
@@ -385,17 +385,23 @@ impl<'a> Comparison<'a> {
         let provenance = Provenance::new(self.renderer.scene(), self.renderer.settings().seed);
         let exposure = auto_exposure(self.smoothest(images));
         let both = |name: &str, image: &Image, enlarge: u32| -> Result<(), Failure> {
-            exr_file::write(&folder.join(format!("{name}.exr")), image, &provenance)?;
-            let mut canvas =
-                crate::export::text::Canvas::new([image.size[0] * enlarge, image.size[1] * enlarge], [0; 3]);
-            canvas.paste(0, 0, image.size, &to_srgb(image, exposure), enlarge);
-            png_file::write(&folder.join(format!("{name}.png")), canvas.size, &canvas.rgb, &provenance)?;
-            Ok(())
+            let path = |extension| folder.join(format!("{name}.{extension}"));
+            let exr = || exr_file::write(&path("exr"), image, &provenance);
+            let png = || {
+                let mut canvas =
+                    crate::export::text::Canvas::new([image.size[0] * enlarge, image.size[1] * enlarge], [0; 3]);
+                canvas.paste(0, 0, image.size, &to_srgb(image, exposure), enlarge);
+                png_file::write(&path("png"), canvas.size, &canvas.rgb, &provenance)
+            };
+            let (exr, png) = rayon::join(exr, png);
+            exr?;
+            Ok(png?)
         };
         let enlarge = self.enlarge;
         let of_estimator = |(name, image): (&String, &Image)| -> Result<(), Failure> {
-            both(name, image, 1)?;
-            both(&format!("{name}_crop"), &image.crop(crop), enlarge)
+            let part = || both(&format!("{name}_crop"), &image.crop(crop), enlarge);
+            let (whole, part) = rayon::join(|| both(name, image, 1), part);
+            whole.and(part)
         };
         let sheet = self.sheet(images, crop, truth, report, exposure);
         let whole_sheet = || -> Result<(), Failure> {

@@ -28,7 +28,7 @@ pub fn auto_exposure(image: &Image) -> f32 {
 
 /// The image times `exposure` through the sRGB curve (IEC 61966-2-1), three bytes for each pixel.
 pub fn to_srgb(image: &Image, exposure: f32) -> Vec<u8> {
-    image.pixels.iter().flat_map(|p| (*p * exposure).to_array().map(srgb_byte)).collect()
+    image.pixels.iter().flat_map(|p| (*p * exposure).to_array().map(|x| SRGB.byte(x))).collect()
 }
 
 /// A linear value as an sRGB byte; below 0 black, above 1 and NaN white.

@@ -20,6 +20,7 @@ use crate::render::watch::{FilmWatch, Watch};
 use crate::scene::Scene;
 use crate::scene::memory::Shortage;
 use crate::trace::Intersector;
+use rayon::prelude::*;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -109,7 +110,7 @@ impl Renderer {
             Plan::new(&scene, &full, &slots(&estimators, settings.gather), &Evidence::default())
         };
         Self {
-            films: estimators.iter().map(|_| Film::new(size)).collect(),
+            films: estimators.par_iter().map(|_| Film::new(size)).collect(),
             estimator_seconds: vec![PartSeconds::default(); estimators.len()],
             photon_seconds: vec![0.0; estimators.len()],
             gathered: vec![0; estimators.len()],
@@ -275,12 +276,13 @@ impl Renderer {
         if pass.number == self.totals.passes {
             self.count(&pass, photon_trace, map_build);
         }
-        for tile in &result.tiles {
-            for (&i, image) in now.iter().zip(&tile.images) {
-                self.films[i].add_tile([tile.rect.x, tile.rect.y], tile.rect.width, &image.pixels);
+        self.films.par_iter_mut().enumerate().for_each(|(i, film)| {
+            let Some(slot) = now.iter().position(|&now| now == i) else { return };
+            for tile in &result.tiles {
+                film.add_tile([tile.rect.x, tile.rect.y], tile.rect.width, &tile.images[slot].pixels);
             }
-        }
-        now.iter().for_each(|&i| self.films[i].finish_pass(pass.area_factor));
+            film.finish_pass(pass.area_factor);
+        });
         self.last = Some(pass);
         Step::Done
     }
