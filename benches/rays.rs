@@ -2,7 +2,6 @@
 
 #![allow(clippy::expect_used, missing_docs, reason = "a failed expectation is how this program reports")]
 
-use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use cusp::math::frame::{cosine_hemisphere, uniform_sphere};
 use cusp::math::sequence::{Sampling, Sequence};
 use cusp::scene::Geometry;
@@ -84,53 +83,69 @@ fn bounces(g: &Geometry, intersector: &Intersector, count: usize) -> Vec<Ray> {
 }
 
 const RAYS: usize = 100_000;
-/// By which both hierarchies are built.
-const BUILDER: BvhBuildParams = BvhBuildParams::very_slow_build();
 
-fn rays(c: &mut Criterion) {
-    for rows in [50, 500] {
+fn rays() {
+    let builders = [("medium", BvhBuildParams::medium_build()), ("very slow", BvhBuildParams::very_slow_build())];
+    for (rows, (name, builder)) in [(50, builders[1]), (500, builders[0]), (500, builders[1])] {
         let g = lumpy_ball(rows);
         let count = g.triangles.len();
-        let intersector = Intersector::by(&g, RADIUS, BUILDER);
+        let intersector = Intersector::by(&g, RADIUS, builder);
         let rays = bounces(&g, &intersector, RAYS);
         let corner = |t: usize| g.corners(t).map(Into::into);
         let triangles: Vec<Triangle> = (0..count).map(corner).map(|[v0, v1, v2]| Triangle { v0, v1, v2 }).collect();
-        let bvh = build_cwbvh_from_tris(&triangles, BUILDER, &mut Duration::default());
+        let bvh = build_cwbvh_from_tris(&triangles, builder, &mut Duration::default());
         let leaves: Vec<Triangle> = bvh.primitive_indices.iter().map(|&i| triangles[i as usize]).collect();
         let prepared = |r: &Ray| obvhs::ray::Ray::new_inf(r.origin.into(), r.direction.into());
 
-        let mut group = c.benchmark_group(format!("bounce_rays_on_{count}_triangles"));
-        group.throughput(Throughput::Elements(RAYS as u64)).sample_size(20);
-        group.bench_function(BenchmarkId::new("closest", "CwBvh::ray_traverse (baseline)"), |b| {
-            b.iter(|| {
-                let met = |r: &&Ray| {
-                    let mut hit = RayHit::none();
-                    bvh.ray_traverse(prepared(r), &mut hit, |ray, leaf| leaves[leaf].intersect(ray))
-                };
-                rays.iter().filter(met).count()
-            });
-        });
-        group.bench_function(BenchmarkId::new("closest", "Intersector"), |b| {
-            b.iter(|| rays.iter().filter(|r| intersector.closest(r).is_some()).count());
-        });
-        group.bench_function(BenchmarkId::new("any_within_1_m", "CwBvh::ray_traverse_miss (baseline)"), |b| {
-            b.iter(|| {
-                let missed = |r: &&Ray| {
-                    let ray = obvhs::ray::Ray { tmax: 1.0, ..prepared(r) };
-                    bvh.ray_traverse_miss(ray, |ray, leaf| leaves[leaf].intersect(ray))
-                };
-                rays.iter().filter(missed).count()
-            });
-        });
-        group.bench_function(BenchmarkId::new("any_within_1_m", "Intersector"), |b| {
-            b.iter(|| rays.iter().filter(|r| !intersector.any(r, 1.0)).count());
-        });
-        group.finish();
+        let theirs = |r: &Ray| {
+            let mut hit = RayHit::none();
+            bvh.ray_traverse(prepared(r), &mut hit, |ray, leaf| leaves[leaf].intersect(ray))
+        };
+        let ours = |r: &Ray| intersector.closest(r).is_some();
+        in_pairs(&format!("closest, {count} triangles, builder {name}"), &rays, theirs, ours);
+        let theirs = |r: &Ray| {
+            let ray = obvhs::ray::Ray { tmax: 1.0, ..prepared(r) };
+            bvh.ray_traverse_miss(ray, |ray, leaf| leaves[leaf].intersect(ray))
+        };
+        let ours = |r: &Ray| !intersector.any(r, 1.0);
+        in_pairs(&format!("any within 1 m, {count} triangles, builder {name}"), &rays, theirs, ours);
     }
 }
 
+/// Pairs of runs whose ratio counts.
+const PAIRS: usize = 41;
+
+/// Runs both in turn, as what a machine has to give changes by the second: rays in a second of each by its median, and the
+/// median ratio of their times with its quartiles.
+fn in_pairs(what: &str, rays: &[Ray], theirs: impl Fn(&Ray) -> bool, ours: impl Fn(&Ray) -> bool) {
+    let timed = |of: &dyn Fn(&Ray) -> bool| {
+        let start = Instant::now();
+        std::hint::black_box(rays.iter().filter(|r| of(r)).count());
+        start.elapsed().as_secs_f64()
+    };
+    // Once for the caches.
+    let _ = (timed(&theirs), timed(&ours));
+    let mut pairs: Vec<[f64; 3]> = (0..PAIRS)
+        .map(|_| {
+            let (theirs, ours) = (timed(&theirs), timed(&ours));
+            [theirs, ours, theirs / ours]
+        })
+        .collect();
+    let mut quartiles = |i: usize| {
+        pairs.sort_by(|a, b| a[i].total_cmp(&b[i]));
+        [1, 2, 3].map(|q| pairs[PAIRS * q / 4][i])
+    };
+    let rate = |seconds: f64| 1e-6 * rays.len() as f64 / seconds;
+    let ([_, theirs, _], [_, ours, _], [low, ratio, high]) = (quartiles(0), quartiles(1), quartiles(2));
+    println!(
+        "{what}: obvhs {:.3} Mrays/s, ours {:.3}, ratio {ratio:.2} ({low:.2} to {high:.2})",
+        rate(theirs),
+        rate(ours)
+    );
+}
+
 /// Seconds that each builder takes, and the rays that its hierarchy then takes in a second.
-fn builders(_: &mut Criterion) {
+fn builders() {
     let all = [
         ("very fast", BvhBuildParams::very_fast_build()),
         ("fast", BvhBuildParams::fast_build()),
@@ -164,5 +179,7 @@ fn builders(_: &mut Criterion) {
     }
 }
 
-criterion_group!(benches, builders, rays);
-criterion_main!(benches);
+fn main() {
+    rays();
+    builders();
+}

@@ -1,5 +1,6 @@
 //! Radiance estimators: one file each, one trait, one registry.
 
+mod batch;
 pub mod clip;
 pub mod construction;
 pub mod coplanar;

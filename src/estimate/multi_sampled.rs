@@ -1,6 +1,7 @@
 //! `multi_sampled`: the kernel averaged over points of the view footprint (Pedersen 2011, eq. 68 to 71).
 
-use super::{Construction, Estimator, Gathered, Lookup, SamplingPoint, View, weighted_sum};
+use super::{Construction, Estimator, Gathered, Lookup, SamplingPoint, View};
+use crate::estimate::batch::{self, BATCH, LANES, Lanes, Parallelograms, in_filter_space, weight_by_mean};
 use crate::estimate::settings::{Spec, SpecError};
 use crate::photons::MapPhoton;
 use glam::{DVec3, Vec3};
@@ -15,8 +16,8 @@ pub enum Grid {
     Cells,
 }
 
-/// Points handled together.
-const LANES: usize = 8;
+/// Columns of points, each with a sum of its own.
+const COLUMNS: usize = 8;
 /// Rows of points that are added up in f32.
 const ROWS: usize = 8;
 
@@ -25,8 +26,8 @@ pub struct MultiSampled {
     n: u32,
     grid: Grid,
     offsets: Vec<f32>,
-    /// The same in groups of [`LANES`], the last one filled up with points of no weight.
-    lanes: Vec<([f32; LANES], [f32; LANES])>,
+    /// The same in groups of [`COLUMNS`], the last one filled up with points of no weight.
+    columns: Vec<([f32; COLUMNS], [f32; COLUMNS])>,
 }
 
 impl MultiSampled {
@@ -39,16 +40,16 @@ impl MultiSampled {
                 Grid::Cells => -1.0 + (2 * i + 1) as f32 / n as f32,
             })
             .collect();
-        let lanes = offsets
-            .chunks(LANES)
+        let columns = offsets
+            .chunks(COLUMNS)
             .map(|chunk| {
-                let (mut offset, mut weight) = ([0.0; LANES], [0.0; LANES]);
+                let (mut offset, mut weight) = ([0.0; COLUMNS], [0.0; COLUMNS]);
                 offset[..chunk.len()].copy_from_slice(chunk);
                 weight[..chunk.len()].fill(1.0);
                 (offset, weight)
             })
             .collect();
-        Self { n, grid, offsets, lanes }
+        Self { n, grid, offsets, columns }
     }
 
     /// `multi_sampled`, with `n` and `grid`.
@@ -63,74 +64,76 @@ impl MultiSampled {
     }
 
     /// Mean of `(1 - u)²` over the points `c + s a + t b` of filter space.
-    #[inline(always)]
     pub fn mean(&self, c: Vec3, a: Vec3, b: Vec3) -> f64 {
-        let (aa, bb, cc) = (a.length_squared(), b.length_squared(), c.length_squared());
-        let reach = 1.0 + aa.sqrt() + bb.sqrt();
-        if cc >= reach * reach {
-            return 0.0;
-        }
-        // On flat ground nothing lies off the photon's plane, and a third of the work is for nothing.
-        let flat = c.z == 0.0 && a.z == 0.0 && b.z == 0.0;
-        let sum = match (self.lanes.as_slice(), flat) {
-            ([one], true) => self.sum::<true>(std::slice::from_ref(one), c, a, b),
-            ([one], false) => self.sum::<false>(std::slice::from_ref(one), c, a, b),
-            (all, _) => self.sum::<false>(all, c, a, b),
-        };
-        sum / f64::from(self.n * self.n)
+        let (mut one, mut means) = (Parallelograms::default(), [0.0; BATCH]);
+        one.push([c, a, b]);
+        self.means(&one, &mut means);
+        means[0]
     }
 
-    /// Sum of `(1 - u)²` over the points; `FLAT` if they lie in the photon's plane.
+    fn means(&self, parallelograms: &Parallelograms, means: &mut [f64; BATCH]) {
+        Arch::new().dispatch(Means { of: self, parallelograms, means });
+    }
+
+    /// Sums of `(1 - u)²` over the points of eight parallelograms; `FLAT` if they lie in the planes of their photons.
     #[inline(always)]
-    fn sum<const FLAT: bool>(&self, lanes: &[([f32; LANES], [f32; LANES])], c: Vec3, a: Vec3, b: Vec3) -> f64 {
+    fn sums<const FLAT: bool>(&self, [c, a, b]: &[[Lanes; 3]; 3]) -> [f64; LANES] {
+        let along = |from: &Lanes, to: &Lanes, s: f32| -> Lanes { std::array::from_fn(|l| from[l] + to[l] * s) };
         // Sums in f32 are kept short: what thousands of terms lose to rounding is as much as they differ by.
-        let mut sum = 0.0f64;
+        let mut all = [0.0f64; LANES];
         for rows in self.offsets.chunks(ROWS) {
-            let mut sums = [0.0f32; LANES];
+            let mut sums = [[0.0f32; LANES]; COLUMNS];
             for &t in rows {
-                let row = c + b * t;
-                for (offset, weight) in lanes {
-                    for l in 0..LANES {
-                        let (x, y) = (row.x + a.x * offset[l], row.y + a.y * offset[l]);
-                        let mut u = x * x + y * y;
-                        if !FLAT {
-                            let z = row.z + a.z * offset[l];
-                            u += z * z;
+                let row = [along(&c[0], &b[0], t), along(&c[1], &b[1], t), along(&c[2], &b[2], t)];
+                for (offsets, weights) in &self.columns {
+                    for ((sum, &s), &weight) in sums.iter_mut().zip(offsets).zip(weights) {
+                        for l in 0..LANES {
+                            let (x, y) = (row[0][l] + a[0][l] * s, row[1][l] + a[1][l] * s);
+                            let mut u = x * x + y * y;
+                            if !FLAT {
+                                let z = row[2][l] + a[2][l] * s;
+                                u += z * z;
+                            }
+                            let k = 1.0 - u;
+                            let k = if k > 0.0 { k } else { 0.0 };
+                            sum[l] += weight * (k * k);
                         }
-                        let k = 1.0 - u;
-                        let k = if k > 0.0 { k } else { 0.0 };
-                        sums[l] += weight[l] * (k * k);
                     }
                 }
             }
-            let pairs = [sums[0] + sums[4], sums[1] + sums[5], sums[2] + sums[6], sums[3] + sums[7]];
-            sum += f64::from((pairs[0] + pairs[2]) + (pairs[1] + pairs[3]));
+            for (l, all) in all.iter_mut().enumerate() {
+                let pair = |i: usize| sums[i][l] + sums[i + 4][l];
+                *all += f64::from((pair(0) + pair(2)) + (pair(1) + pair(3)));
+            }
         }
-        sum
-    }
-
-    #[inline(always)]
-    fn over_area(&self, photon: &MapPhoton, view: &View) -> f64 {
-        // The two footprint vectors enter filter space once for each photon, not once for each point.
-        let c = photon.to_filter(view.query.center - photon.position);
-        let [a, b] = view.query.axes.map(|v| photon.to_filter(v));
-        3.0 * self.mean(c, a, b) * f64::from(photon.inverse_area)
+        all
     }
 }
 
-/// The estimate as one function, compiled for each set of instructions; all round alike.
-struct Sum<'a> {
+/// The means of a batch as one function, compiled for each set of instructions; all round alike.
+struct Means<'a> {
     of: &'a MultiSampled,
-    gathered: &'a Gathered<'a>,
-    view: &'a View,
+    parallelograms: &'a Parallelograms,
+    means: &'a mut [f64; BATCH],
 }
 
-impl WithSimd for Sum<'_> {
-    type Output = DVec3;
+impl WithSimd for Means<'_> {
+    type Output = ();
 
     #[inline(always)]
-    fn with_simd<I: Simd>(self, _: I) -> DVec3 {
-        weighted_sum(self.gathered, |p| self.of.over_area(p, self.view))
+    fn with_simd<I: Simd>(self, _: I) {
+        let points = f64::from(self.of.n * self.of.n);
+        for first in (0..self.parallelograms.in_whole_lanes()).step_by(LANES) {
+            let lanes = self.parallelograms.lanes(first);
+            // On flat ground nothing lies off the photons' planes, and a third of the work is for nothing.
+            let flat = lanes.iter().all(|v| v[2] == [0.0; LANES]);
+            let sums = if flat { self.of.sums::<true>(&lanes) } else { self.of.sums::<false>(&lanes) };
+            for (i, sum) in sums.into_iter().enumerate() {
+                let [cc, aa, bb] = self.parallelograms.at(first + i).map(|v| v.length_squared());
+                let reach = 1.0 + aa.sqrt() + bb.sqrt();
+                self.means[first + i] = if cc >= reach * reach { 0.0 } else { sum / points };
+            }
+        }
     }
 }
 
@@ -156,11 +159,18 @@ impl Estimator for MultiSampled {
     }
 
     fn weight(&self, photon: &MapPhoton, view: &View, _radius: f32) -> f64 {
-        self.over_area(photon, view)
+        let [c, a, b] = in_filter_space(photon, view);
+        weight_by_mean(self.mean(c, a, b), photon)
     }
 
     fn irradiance(&self, gathered: &Gathered, view: &View) -> DVec3 {
-        Arch::new().dispatch(Sum { of: self, gathered, view })
+        let mut irradiance = DVec3::ZERO;
+        self.irradiances(&mut std::iter::once((*gathered, *view)), &mut |sum| irradiance = sum);
+        irradiance
+    }
+
+    fn irradiances<'a>(&self, hits: &mut dyn Iterator<Item = (Gathered<'a>, View)>, put: &mut dyn FnMut(DVec3)) {
+        batch::irradiances(hits, put, |of, means| self.means(of, means));
     }
 
     fn construction(&self, photon: &MapPhoton, view: &View) -> Construction {

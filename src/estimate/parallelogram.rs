@@ -3,6 +3,7 @@
 //! As an integral over a polygon, but for four edges that come in pairs; and without a branch, so that many parallelograms
 //! are integrated at once in lanes. Whatever a case needs is computed for all, and what does not hold is not taken.
 
+use crate::estimate::batch::{BATCH, Parallelograms};
 use crate::estimate::polygon::{GAUSS, SHORT, THIN};
 use crate::math::angle::angle;
 use glam::{DVec2, DVec3, Vec3};
@@ -22,71 +23,16 @@ pub fn mean_over_parallelogram(c: Vec3, a: Vec3, b: Vec3) -> f64 {
     with_width(mean(c, a, b), c, a, b)
 }
 
-/// Parallelograms whose means are computed at once.
-pub const BATCH: usize = 64;
-
-/// Parallelograms in filter space as a structure of arrays.
-pub struct Parallelograms {
-    /// Centres and half-edges by coordinate.
-    corners: [[[f32; BATCH]; 3]; 3],
-    count: usize,
-}
-
-impl Default for Parallelograms {
-    fn default() -> Self {
-        Self { corners: [[[0.0; BATCH]; 3]; 3], count: 0 }
-    }
-}
-
-impl Parallelograms {
-    /// Number of them.
-    pub fn len(&self) -> usize {
-        self.count
-    }
-
-    /// Whether there are none.
-    pub fn is_empty(&self) -> bool {
-        self.count == 0
-    }
-
-    /// Adds one, unless there are [`BATCH`] of them.
-    #[inline(always)]
-    pub fn push(&mut self, c: Vec3, a: Vec3, b: Vec3) {
-        let at = self.count;
-        if at < BATCH {
-            for (of, v) in self.corners.iter_mut().zip([c, a, b]) {
-                for (of, x) in of.iter_mut().zip(v.to_array()) {
-                    of[at] = x;
-                }
-            }
-            self.count += 1;
+/// [`mean_over_parallelogram`] of each, to the bit.
+pub(super) fn means_over_parallelograms(of: &Parallelograms, means: &mut [f64; BATCH]) {
+    Arch::new().dispatch(Means { of, means });
+    for (i, m) in means.iter_mut().enumerate().take(of.len()) {
+        if *m < 0.0 {
+            let [c, a, b] = of.at(i).map(|v| v.as_dvec3());
+            *m = with_width(*m, c, a, b);
         }
     }
-
-    /// Forgets them.
-    pub fn clear(&mut self) {
-        self.count = 0;
-    }
-
-    /// [`mean_over_parallelogram`] of each, to the bit.
-    pub fn means(&self, means: &mut [f64; BATCH]) {
-        Arch::new().dispatch(Means { of: self, means });
-        for (i, m) in means.iter_mut().enumerate().take(self.count) {
-            if *m < 0.0 {
-                let [c, a, b] = self.at(i);
-                *m = with_width(*m, c, a, b);
-            }
-        }
-    }
-
-    #[inline(always)]
-    fn at(&self, i: usize) -> [DVec3; 3] {
-        self.corners.each_ref().map(|of| DVec3::from_array(of.each_ref().map(|x| f64::from(x[i]))))
-    }
 }
-
-/// Parallelograms of which the processor takes one for each of its lanes.
-const LANES: usize = 8;
 
 struct Means<'a> {
     of: &'a Parallelograms,
@@ -98,10 +44,8 @@ impl WithSimd for Means<'_> {
 
     #[inline(always)]
     fn with_simd<I: Simd>(self, _: I) {
-        // Whole lanes, of which the last may hold what was there before.
-        let count = self.of.count.next_multiple_of(LANES).min(BATCH);
-        for (i, m) in self.means.iter_mut().enumerate().take(count) {
-            let [c, a, b] = self.of.at(i);
+        for (i, m) in self.means.iter_mut().enumerate().take(self.of.in_whole_lanes()) {
+            let [c, a, b] = self.of.at(i).map(|v| v.as_dvec3());
             *m = mean(c, a, b);
         }
     }
@@ -506,9 +450,9 @@ mod tests {
                 })
                 .collect();
             all.clear();
-            own.iter().for_each(|[c, a, b]| all.push(*c, *a, *b));
-            assert!(all.len() == own.len() && all.is_empty() == own.is_empty());
-            all.means(&mut means);
+            own.iter().for_each(|corners| all.push(*corners));
+            assert_eq!(all.len(), own.len());
+            means_over_parallelograms(&all, &mut means);
             for ([c, a, b], m) in own.iter().zip(means) {
                 thin += u32::from(mean(c.as_dvec3(), a.as_dvec3(), b.as_dvec3()) < 0.0);
                 assert_eq!(m.to_bits(), mean_over_parallelogram(*c, *a, *b).to_bits(), "{c} {a} {b}");

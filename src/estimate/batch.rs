@@ -1,0 +1,162 @@
+//! Photons of one hit after the other as a structure of arrays, whose weights are computed together in lanes.
+
+use super::{Gathered, View};
+use crate::photons::MapPhoton;
+use glam::{DVec3, Vec3};
+
+/// Photons whose weights are computed at once.
+pub(super) const BATCH: usize = 64;
+
+/// Those of which the processor takes one for each of its lanes.
+pub(super) const LANES: usize = 8;
+
+/// The same number of each of [`LANES`] parallelograms.
+pub(super) type Lanes = [f32; LANES];
+
+/// View footprints in the filter space of a photon each.
+pub(super) struct Parallelograms {
+    /// Centres and half-edges by coordinate.
+    corners: [[[f32; BATCH]; 3]; 3],
+    count: usize,
+}
+
+impl Default for Parallelograms {
+    fn default() -> Self {
+        Self { corners: [[[0.0; BATCH]; 3]; 3], count: 0 }
+    }
+}
+
+impl Parallelograms {
+    /// Number of them.
+    pub fn len(&self) -> usize {
+        self.count
+    }
+
+    /// The number of which whole lanes can be made; the last ones hold what was there before.
+    #[inline(always)]
+    pub fn in_whole_lanes(&self) -> usize {
+        self.count.next_multiple_of(LANES).min(BATCH)
+    }
+
+    /// Adds one by its centre and half-edges, unless there are [`BATCH`] of them.
+    #[inline(always)]
+    pub fn push(&mut self, corners: [Vec3; 3]) {
+        let at = self.count;
+        if at < BATCH {
+            for (of, v) in self.corners.iter_mut().zip(corners) {
+                for (of, x) in of.iter_mut().zip(v.to_array()) {
+                    of[at] = x;
+                }
+            }
+            self.count += 1;
+        }
+    }
+
+    /// Forgets them.
+    pub fn clear(&mut self) {
+        self.count = 0;
+    }
+
+    /// Centre and half-edges of one.
+    #[inline(always)]
+    pub fn at(&self, i: usize) -> [Vec3; 3] {
+        self.corners.each_ref().map(|of| Vec3::from_array(of.each_ref().map(|x| x[i])))
+    }
+
+    /// Those of [`LANES`], by coordinate; `first` is a multiple of that.
+    #[inline(always)]
+    pub fn lanes(&self, first: usize) -> [[Lanes; 3]; 3] {
+        let of = |x: &[f32; BATCH]| std::array::from_fn(|lane| x[first + lane]);
+        self.corners.each_ref().map(|v| v.each_ref().map(of))
+    }
+}
+
+/// Centre and half-edges of the view footprint in the photon's filter space.
+#[inline(always)]
+pub(super) fn in_filter_space(photon: &MapPhoton, view: &View) -> [Vec3; 3] {
+    let [a, b] = view.query.axes;
+    [view.query.center - photon.position, a, b].map(|v| photon.to_filter(v))
+}
+
+/// Weight of a photon, 1/m², by the mean of `(1 - u)²` over the view footprint.
+#[inline(always)]
+pub(super) fn weight_by_mean(mean: f64, photon: &MapPhoton) -> f64 {
+    3.0 * mean * f64::from(photon.inverse_area)
+}
+
+/// Irradiance at each hit, as [`super::Estimator::irradiances`] has it, of an estimator whose weights come from means over
+/// the view footprint: `means` computes those of a batch.
+pub(super) fn irradiances<'a>(
+    hits: &mut dyn Iterator<Item = (Gathered<'a>, View)>,
+    put: &mut dyn FnMut(DVec3),
+    means: impl Fn(&Parallelograms, &mut [f64; BATCH]),
+) {
+    let mut batch = Batch {
+        parallelograms: Parallelograms::default(),
+        photons: [None; BATCH],
+        ends: [0; BATCH],
+        hits: 0,
+        sum: DVec3::ZERO,
+        means,
+        put,
+    };
+    for (gathered, view) in hits {
+        batch.add(&gathered, &view);
+    }
+    batch.finish();
+}
+
+struct Batch<'a, 'b, M> {
+    parallelograms: Parallelograms,
+    photons: [Option<&'a MapPhoton>; BATCH],
+    /// Where hits end whose photons are all there.
+    ends: [usize; BATCH],
+    hits: usize,
+    /// What photons before these add up to, of the hit that the first of these belongs to.
+    sum: DVec3,
+    means: M,
+    put: &'b mut dyn FnMut(DVec3),
+}
+
+impl<'a, M: Fn(&Parallelograms, &mut [f64; BATCH])> Batch<'a, '_, M> {
+    /// Adds a hit.
+    fn add(&mut self, gathered: &Gathered<'a>, view: &View) {
+        for &i in gathered.indices {
+            let photon = &gathered.photons[i as usize];
+            self.photons[self.parallelograms.len()] = Some(photon);
+            self.parallelograms.push(in_filter_space(photon, view));
+            if self.parallelograms.len() == BATCH {
+                self.finish();
+            }
+        }
+        self.ends[self.hits] = self.parallelograms.len();
+        self.hits += 1;
+        if self.hits == BATCH {
+            self.finish();
+        }
+    }
+
+    /// Hands over what the hits that have ended add up to, and keeps the sum of one that goes on.
+    fn finish(&mut self) {
+        let mut means = [0.0; BATCH];
+        (self.means)(&self.parallelograms, &mut means);
+        let mut ends = self.ends[..self.hits].iter().peekable();
+        let pairs = self.photons.iter().zip(means).take(self.parallelograms.len());
+        for (i, (photon, mean)) in pairs.enumerate() {
+            while ends.next_if_eq(&&i).is_some() {
+                (self.put)(std::mem::take(&mut self.sum));
+            }
+            if let Some(photon) = photon {
+                let weight = weight_by_mean(mean, photon);
+                if weight != 0.0 {
+                    self.sum += photon.power.as_dvec3() * weight;
+                }
+            }
+        }
+        for _ in ends {
+            (self.put)(std::mem::take(&mut self.sum));
+        }
+        self.parallelograms.clear();
+        self.hits = 0;
+    }
+}
