@@ -7,6 +7,9 @@ pub const MAX_CORNERS: usize = 64;
 /// Vertices of a clipped parallelogram: each half-plane adds one at most.
 pub const MAX_VERTICES: usize = MAX_CORNERS + 4;
 
+/// Vertices of a parallelogram that is clipped by another.
+pub const SQUARE_VERTICES: usize = 8;
+
 /// A vertex of the view parallelogram, known both ways.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Vertex {
@@ -25,16 +28,16 @@ pub struct HalfPlane {
     pub distance: f64,
 }
 
-/// A convex polygon that is being clipped.
-pub struct ClippedPolygon {
-    vertices: [Vertex; MAX_VERTICES],
+/// A convex polygon of up to `N` vertices that is being clipped: four, and one for each half-plane.
+pub struct ClippedPolygon<const N: usize = MAX_VERTICES> {
+    vertices: [Vertex; N],
     len: usize,
 }
 
-impl ClippedPolygon {
+impl<const N: usize> ClippedPolygon<N> {
     /// The whole view parallelogram with centre `c` and half-edges `a`, `b` in the photon's footprint.
     pub fn whole(c: DVec2, a: DVec2, b: DVec2) -> Self {
-        let mut polygon = Self { vertices: [Vertex::default(); MAX_VERTICES], len: 4 };
+        let mut polygon = Self { vertices: [Vertex::default(); N], len: N.min(4) };
         for (v, (s, t)) in polygon.vertices.iter_mut().zip([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]) {
             *v = Vertex { parameter: DVec2::new(s, t), footprint: c + a * s + b * t };
         }
@@ -52,17 +55,18 @@ impl ClippedPolygon {
         if self.vertices().iter().all(|v| outside(v) <= 0.0) {
             return;
         }
-        let mut kept = [Vertex::default(); MAX_VERTICES];
+        let mut kept = [Vertex::default(); N];
         let mut count = 0;
         let mut push = |v: Vertex| {
             // A convex polygon gains one vertex for each half-plane, so the array holds them all.
-            if count < MAX_VERTICES {
+            if count < N {
                 kept[count] = v;
                 count += 1;
             }
         };
         for i in 0..self.len {
-            let (p, q) = (self.vertices[i], self.vertices[(i + 1) % self.len]);
+            let next = if i + 1 < self.len { i + 1 } else { 0 };
+            let (p, q) = (self.vertices[i], self.vertices[next]);
             let (dp, dq) = (outside(&p), outside(&q));
             if dp <= 0.0 {
                 push(p);
@@ -125,7 +129,7 @@ mod tests {
     use proptest::prelude::*;
 
     fn clipped(c: DVec2, a: DVec2, b: DVec2, planes: &[HalfPlane]) -> ClippedPolygon {
-        let mut p = ClippedPolygon::whole(c, a, b);
+        let mut p = ClippedPolygon::<MAX_VERTICES>::whole(c, a, b);
         planes.iter().for_each(|h| p.clip(h));
         p
     }

@@ -6,7 +6,7 @@
 //! carry their parameters in the view footprint along, which maps the centroid back (eq. 66) without an inverse.
 
 use super::{Construction, Estimator, Gathered, Lookup, SamplingPoint, View, weighted_sum};
-use crate::estimate::clip::{self, ClippedPolygon, HalfPlane, MAX_CORNERS, MAX_VERTICES};
+use crate::estimate::clip::{self, ClippedPolygon, HalfPlane, MAX_CORNERS, MAX_VERTICES, SQUARE_VERTICES};
 use crate::estimate::kernel::silverman;
 use crate::estimate::parallelogram::mean_over_parallelogram;
 use crate::estimate::polygon::mean_over_part;
@@ -101,9 +101,9 @@ impl Coplanar {
         Some([pc, pa, pb])
     }
 
-    /// A view footprint that [`Coplanar::projected`] gave, clipped by the photon's polygon.
+    /// A view footprint that [`Coplanar::projected`] gave, clipped by the photon's polygon; `N` must hold its vertices.
     #[inline]
-    pub fn clipped(&self, [pc, pa, pb]: [DVec2; 3]) -> ClippedPolygon {
+    pub fn clipped<const N: usize>(&self, [pc, pa, pb]: [DVec2; 3]) -> ClippedPolygon<N> {
         let mut polygon = ClippedPolygon::whole(pc, pa, pb);
         for plane in &self.planes {
             polygon.clip(plane);
@@ -112,10 +112,18 @@ impl Coplanar {
     }
 
     fn over_area(&self, photon: &MapPhoton, view: &View) -> f64 {
+        match self.shape {
+            Shape::Parallelogram => self.over_area_with::<SQUARE_VERTICES>(photon, view),
+            Shape::Ellipse(_) => self.over_area_with::<MAX_VERTICES>(photon, view),
+        }
+    }
+
+    #[inline]
+    fn over_area_with<const N: usize>(&self, photon: &MapPhoton, view: &View) -> f64 {
         let Some(projected) = Self::projected(photon, view) else {
             return 0.0;
         };
-        let polygon = self.clipped(projected);
+        let polygon = self.clipped::<N>(projected);
         let (coverage, centroid) = polygon.coverage_and_centroid();
         if coverage <= 0.0 {
             return 0.0;
@@ -129,8 +137,8 @@ impl Coplanar {
             }
             Weight::Mean => {
                 let (fc, fa, fb) = (photon.to_filter(offset), photon.to_filter(a), photon.to_filter(b));
-                let mut parameters = [DVec2::ZERO; MAX_VERTICES];
-                let mut buffer = [DVec2::ZERO; MAX_VERTICES];
+                let mut parameters = [DVec2::ZERO; N];
+                let mut buffer = [DVec2::ZERO; N];
                 let vertices = polygon.vertices();
                 for (p, v) in parameters.iter_mut().zip(vertices) {
                     *p = v.parameter;
@@ -187,7 +195,7 @@ impl Estimator for Coplanar {
         let Some(projected) = Self::projected(photon, view) else {
             return Construction::default();
         };
-        let polygon = self.clipped(projected);
+        let polygon = self.clipped::<MAX_VERTICES>(projected);
         let (coverage, centroid) = polygon.coverage_and_centroid();
         let [a, b] = view.query.axes;
         let at = |p: DVec2| view.query.center + a * p.x as f32 + b * p.y as f32;

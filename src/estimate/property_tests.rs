@@ -202,7 +202,7 @@ proptest! {
         let det = a.perp_dot(b);
         prop_assume!(det.abs() > 0.01);
         let clipped = |c, a, b, planes: &[HalfPlane]| {
-            let mut p = ClippedPolygon::whole(c, a, b);
+            let mut p = ClippedPolygon::<{ clip::MAX_VERTICES }>::whole(c, a, b);
             planes.iter().for_each(|h| p.clip(h));
             p.coverage_and_centroid()
         };

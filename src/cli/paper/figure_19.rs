@@ -14,6 +14,7 @@ use crate::cli::paper::spread::Spread;
 use crate::cli::paper::test_case::TestCase;
 use crate::cli::progress::{bar, interrupted};
 use crate::cli::table::Table;
+use crate::estimate::clip::SQUARE_VERTICES;
 use crate::estimate::coplanar::{Coplanar, Shape, Weight};
 use crate::estimate::{Estimator, View};
 use crate::export::sheet::PALETTE;
@@ -162,7 +163,7 @@ fn steps(coplanar: &Coplanar, tile: &GatheredTile, maps: &PhotonMaps, turn: usiz
             }),
             2 => timed(tile, maps, |p, v| match Coplanar::projected(p, v) {
                 Some(projected) => {
-                    let (coverage, centroid) = coplanar.clipped(projected).coverage_and_centroid();
+                    let (coverage, centroid) = coplanar.clipped::<SQUARE_VERTICES>(projected).coverage_and_centroid();
                     coverage + centroid.x + centroid.y
                 }
                 None => 0.0,

@@ -7,6 +7,7 @@ use super::oracle::quadrature::integral;
 use super::oracle::random::Random;
 use super::oracle::svd::Ellipse;
 use super::{Case, Outcome};
+use crate::estimate::clip::{ClippedPolygon, MAX_VERTICES};
 use crate::estimate::multi_sampled::{Grid, MultiSampled};
 use crate::estimate::registry::{ESTIMATORS, estimator};
 use crate::estimate::{Estimator, Lookup, View, coplanar};
@@ -387,7 +388,7 @@ fn coverage() -> Outcome {
             1 => DVec2::from_angle(random.range(0.0, 6.3)) * random.unit() + a * random.range(-1.0, 1.0) + b,
             _ => a * random.range(-1.1, 1.1) + b * random.range(-1.1, 1.1),
         };
-        let mut clipped = crate::estimate::clip::ClippedPolygon::whole(c, a, b);
+        let mut clipped = ClippedPolygon::<MAX_VERTICES>::whole(c, a, b);
         planes.iter().for_each(|p| clipped.clip(p));
         let (share, centroid) = clipped.coverage_and_centroid();
         let (exact, at) = covered(&normals, c, a, b);
