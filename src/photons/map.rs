@@ -155,9 +155,11 @@ pub fn map_bytes(parts: MapParts) -> usize {
     size_of::<MapPhoton>() + structures.iter().filter(|(on, _)| *on).map(|(_, bytes)| bytes).sum::<usize>()
 }
 
-/// Memory of a stored photon while a map is built, beyond that of the map, bytes: the overlap structure is finished before
-/// the photons are made ready, the kd-tree is built after that.
-pub const BUILT_BYTES: usize = kd_tree::BYTES_PER_BUILT_ENTRY;
+/// Memory of a stored photon while a map with those structures is built, beyond that of the map, bytes: places on the curve
+/// before the photons are made ready, the kd-tree's entries after that.
+pub fn built_bytes(parts: MapParts) -> usize {
+    if parts.kd_tree { kd_tree::BYTES_PER_BUILT_ENTRY } else { overlap::BYTES_PER_BUILT_ENTRY }
+}
 
 impl PhotonMap {
     /// Prepares photons; the same photons give the same map.

@@ -4,7 +4,7 @@
 //! foreseen is left out: photons that one view hit gathers, four bytes each for every thread.
 
 use crate::photons::irradiance::{global_photons, layer};
-use crate::photons::map::{BUILT_BYTES, MapParts, map_bytes};
+use crate::photons::map::{MapParts, built_bytes, map_bytes};
 use crate::photons::{StoredPhoton, kd_tree};
 use crate::render::error_estimate;
 use crate::render::evidence::Pilot;
@@ -52,7 +52,7 @@ impl MemoryNeed {
             images: image_bytes(settings.size, estimators),
             photons_stored,
             photons: bytes(photons_stored, passes * size_of::<StoredPhoton>()),
-            maps: bytes(photons_stored, BUILT_BYTES + passes * map_bytes(parts) + gathering),
+            maps: bytes(photons_stored, built_bytes(parts) + passes * map_bytes(parts) + gathering),
         }
     }
 

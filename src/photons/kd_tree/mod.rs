@@ -70,8 +70,8 @@ pub const BYTES_PER_ENTRY: usize = size_of::<Block>() / LANES + size_of::<u32>()
 pub const BYTES_PER_ENTRY_OF_SMALL_LEAVES: usize =
     2 * size_of::<Block>() / (LANES + 1) + size_of::<u32>() + 4 * size_of::<Node>() / SMALL_LEAF;
 
-/// Memory of one entry while the tree is built, beside that of the tree.
-pub const BYTES_PER_BUILT_ENTRY: usize = size_of::<(Vec3, u32)>();
+/// Memory of one entry while the tree is built, beside that of the tree: once, and again while wide nodes are cut.
+pub const BYTES_PER_BUILT_ENTRY: usize = 2 * size_of::<(Vec3, u32)>();
 
 /// A balanced kd-tree.
 #[derive(Clone, Debug, Default)]

@@ -20,6 +20,9 @@ pub(super) const LANES: usize = 8;
 /// Memory of one entry: its box, its share of the boxes above, and its place in the order.
 pub const BYTES_PER_ENTRY: usize = 28 + size_of::<u32>();
 
+/// Memory of one entry while entries are put in order.
+pub const BYTES_PER_BUILT_ENTRY: usize = size_of::<(u64, u32)>();
+
 /// Centre and half-size.
 type Bounds = (Vec3, Vec3);
 
