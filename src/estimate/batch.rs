@@ -78,6 +78,20 @@ pub(super) fn in_filter_space(photon: &MapPhoton, view: &View) -> [Vec3; 3] {
     [view.query.center - photon.position, a, b].map(|v| photon.to_filter(v))
 }
 
+/// Whether the view footprint is farther from the photon's ball than rounding may tell, so that the photon has no weight:
+/// most of many nearest photons.
+#[inline(always)]
+fn is_far([c, a, b]: &[Vec3; 3]) -> bool {
+    let cc = c.length_squared();
+    if cc <= 1.0 {
+        return false;
+    }
+    // |a| + |b| is at most √(2 (aa + bb)).
+    let spread = 2.0 * (a.length_squared() + b.length_squared());
+    let gap = cc - 1.0 - spread;
+    gap > 1e-4 * cc && gap * gap > 4.001 * spread
+}
+
 /// Weight of a photon, 1/m², by the mean of `(1 - u)²` over the view footprint.
 #[inline(always)]
 pub(super) fn weight_by_mean(mean: f64, photon: &MapPhoton) -> f64 {
@@ -123,8 +137,12 @@ impl<'a, M: Fn(&Parallelograms, &mut [f64; BATCH])> Batch<'a, '_, M> {
     fn add(&mut self, gathered: &Gathered<'a>, view: &View) {
         for &i in gathered.indices {
             let photon = &gathered.photons[i as usize];
+            let corners = in_filter_space(photon, view);
+            if is_far(&corners) {
+                continue;
+            }
             self.photons[self.parallelograms.len()] = Some(photon);
-            self.parallelograms.push(in_filter_space(photon, view));
+            self.parallelograms.push(corners);
             if self.parallelograms.len() == BATCH {
                 self.finish();
             }

@@ -188,7 +188,12 @@ proptest! {
             let mut together = Vec::new();
             e.irradiances(&mut hits.iter().copied(), &mut |sum| together.push(sum));
             let alone: Vec<glam::DVec3> = hits.iter().map(|(found, view)| e.irradiance(found, view)).collect();
-            prop_assert_eq!(together, alone, "{}", e.name());
+            prop_assert_eq!(&together, &alone, "{}", e.name());
+            for ((found, view), sum) in hits.iter().zip(alone) {
+                let own = found.indices.iter().map(|&i| &found.photons[i as usize]);
+                let weighed = own.map(|p| p.power.as_dvec3() * e.weight(p, view, found.radius)).sum::<glam::DVec3>();
+                prop_assert!((weighed - sum).length() <= 1e-13 * sum.length(), "{}: {weighed} {sum}", e.name());
+            }
         }
     }
 

@@ -2,6 +2,7 @@
 
 use crate::math::rgb::Rgb;
 use crate::photons::Photon;
+use crate::photons::ellipsoid::meets_unit_ball;
 use crate::photons::footprint::FilterTransform;
 use crate::photons::kd_tree::{self, KdTree, Nearest, NearestQuery};
 use crate::photons::overlap::{self, Block, LANES, Near, OverlapTree, packing_order};
@@ -308,56 +309,6 @@ fn bounds(query: Query) -> (Vec3, Vec3) {
     (query.center, a.abs() + b.abs())
 }
 
-/// What f32 may get wrong of squared lengths, of their sum.
-const UNSURE: f32 = 1e-5;
-
-/// Whether the query's parallelogram comes nearer than 1 to the photon in filter space.
-pub fn meets_unit_ball(p: &MapPhoton, query: &Query) -> bool {
-    let c = p.to_filter(query.center - p.position);
-    let cc = c.length_squared();
-    if cc < 1.0 {
-        return true;
-    }
-    let [a, b] = query.axes.map(|v| p.to_filter(v));
-    let (aa, bb) = (a.length_squared(), b.length_squared());
-    let reach = 1.0 + aa.sqrt() + bb.sqrt();
-    if cc >= reach * reach {
-        return false;
-    }
-    // In f32 what is decided by more than its rounding: by the plane across the way to the centre, and by a point that is
-    // near the nearest.
-    let (ca, cb) = (c.dot(a), c.dot(b));
-    let rounding = UNSURE * (1.0 + cc + aa + bb);
-    if cc - ca.abs() - cb.abs() > cc.sqrt() + rounding {
-        return false;
-    }
-    let near = c + a * (-ca / aa).clamp(-1.0, 1.0) + b * (-cb / bb).clamp(-1.0, 1.0);
-    if near.length_squared() < 1.0 - rounding {
-        return true;
-    }
-    nearest_on_parallelogram(c, a, b) < 1.0
-}
-
-/// Squared distance of the parallelogram `c + s a + t b`, `|s|, |t| ≤ 1`, from the origin.
-fn nearest_on_parallelogram(c: Vec3, a: Vec3, b: Vec3) -> f32 {
-    let (c, a, b) = (c.as_dvec3(), a.as_dvec3(), b.as_dvec3());
-    let (aa, bb, ab) = (a.length_squared(), b.length_squared(), a.dot(b));
-    let (ca, cb) = (c.dot(a), c.dot(b));
-    let det = aa * bb - ab * ab;
-    if det > 0.0 {
-        let (s, t) = ((cb * ab - ca * bb) / det, (ca * ab - cb * aa) / det);
-        if s.abs() <= 1.0 && t.abs() <= 1.0 {
-            return (c + a * s + b * t).length_squared() as f32;
-        }
-    }
-    let along = |from: glam::DVec3, edge: glam::DVec3, squared: f64| {
-        let s = if squared > 0.0 { (-from.dot(edge) / squared).clamp(-1.0, 1.0) } else { 0.0 };
-        (from + edge * s).length_squared()
-    };
-    let nearest = along(c - b, a, aa).min(along(c + b, a, aa)).min(along(c - a, b, bb)).min(along(c + a, b, bb));
-    nearest as f32
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -458,28 +409,6 @@ mod tests {
             }
         }
         assert!(total > 2000, "{total}");
-    }
-
-    /// What is decided in f32 is what the nearest point decides in f64, for large and small footprints of both.
-    #[test]
-    fn short_cuts_decide_as_the_nearest_point_does() {
-        let map = PhotonMap::new(&random_photons(700), LIMITS, MapParts { kd_tree: false, overlap: true });
-        let (mut met, mut missed) = (0, 0);
-        for q in queries(600) {
-            for scale in [1e-3, 1.0, 30.0] {
-                let q = Query { axes: q.axes.map(|v| v * scale), ..q };
-                for p in map.photons() {
-                    let c = p.to_filter(q.center - p.position);
-                    let [a, b] = q.axes.map(|v| p.to_filter(v));
-                    let exact = nearest_on_parallelogram(c, a, b) < 1.0;
-                    assert_eq!(meets_unit_ball(p, &q), exact, "{p:?} {q:?}");
-                    let near = c.length() < 1.0 + a.length() + b.length() && c.length() > 1.0;
-                    met += u32::from(near && exact);
-                    missed += u32::from(near && !exact);
-                }
-            }
-        }
-        assert!(met > 3000 && missed > 3000, "{met} {missed}");
     }
 
     /// With k above the map's size `knn` finds every photon that overlaps.

@@ -5,8 +5,8 @@
 //! the mean; groups differ by their photons, and by their footprints.
 
 use crate::math::rgb::Rgb;
+use crate::render::cells::cells_of_pass;
 use crate::render::film::{Image, Rect};
-use crate::render::view_pass::cells_of_pass;
 use glam::DVec3;
 use rayon::prelude::*;
 use serde::Serialize;

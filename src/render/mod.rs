@@ -1,5 +1,6 @@
 //! Rendering: settings, plan, photon pass, view pass, film, and the progressive renderer that drives them.
 
+mod cells;
 pub mod change;
 pub mod error_estimate;
 pub mod evidence;

@@ -1,7 +1,8 @@
 //! How a photon's footprint and a view footprint lie to each other (Pedersen 2011, figure 10).
 
 use crate::photons::MapPhoton;
-use crate::photons::map::{Query, meets_unit_ball};
+use crate::photons::ellipsoid::meets_unit_ball;
+use crate::photons::map::Query;
 use serde::Serialize;
 
 /// One of the thesis's three situations, or none of them.
