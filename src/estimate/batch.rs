@@ -38,9 +38,9 @@ impl Parallelograms {
         self.count.next_multiple_of(LANES).min(BATCH)
     }
 
-    /// Adds one by its centre and half-edges, unless there are [`BATCH`] of them.
+    /// Adds one by its centre and half-edges if it `counts`, unless there are [`BATCH`] of them.
     #[inline(always)]
-    pub fn push(&mut self, corners: [Vec3; 3]) {
+    pub fn push_if(&mut self, counts: bool, corners: [Vec3; 3]) {
         let at = self.count;
         if at < BATCH {
             for (of, v) in self.corners.iter_mut().zip(corners) {
@@ -48,7 +48,7 @@ impl Parallelograms {
                     of[at] = x;
                 }
             }
-            self.count += 1;
+            self.count += usize::from(counts);
         }
     }
 
@@ -83,13 +83,10 @@ pub(super) fn in_filter_space(photon: &MapPhoton, view: &View) -> [Vec3; 3] {
 #[inline(always)]
 fn is_far([c, a, b]: &[Vec3; 3]) -> bool {
     let cc = c.length_squared();
-    if cc <= 1.0 {
-        return false;
-    }
     // |a| + |b| is at most √(2 (aa + bb)).
     let spread = 2.0 * (a.length_squared() + b.length_squared());
     let gap = cc - 1.0 - spread;
-    gap > 1e-4 * cc && gap * gap > 4.001 * spread
+    (gap > 1e-4 * cc) & (gap * gap > 4.001 * spread)
 }
 
 /// Weight of a photon, 1/m², by the mean of `(1 - u)²` over the view footprint.
@@ -138,11 +135,9 @@ impl<'a, M: Fn(&Parallelograms, &mut [f64; BATCH])> Batch<'a, '_, M> {
         for &i in gathered.indices {
             let photon = &gathered.photons[i as usize];
             let corners = in_filter_space(photon, view);
-            if is_far(&corners) {
-                continue;
-            }
             self.photons[self.parallelograms.len()] = Some(photon);
-            self.parallelograms.push(corners);
+            // Written in any case: whether one is far is hard to foresee, and a branch that goes wrong costs more.
+            self.parallelograms.push_if(!is_far(&corners), corners);
             if self.parallelograms.len() == BATCH {
                 self.finish();
             }
