@@ -117,6 +117,17 @@ pub(super) fn irradiances<'a>(
     batch.finish();
 }
 
+/// The same at one hit, W/m².
+pub(super) fn irradiance(
+    gathered: &Gathered,
+    view: &View,
+    means: impl Fn(&Parallelograms, &mut [f64; BATCH]),
+) -> DVec3 {
+    let mut irradiance = DVec3::ZERO;
+    irradiances(&mut std::iter::once((*gathered, *view)), &mut |sum| irradiance = sum, means);
+    irradiance
+}
+
 struct Batch<'a, 'b, M> {
     parallelograms: Parallelograms,
     photons: [Option<&'a MapPhoton>; BATCH],

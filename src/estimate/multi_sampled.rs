@@ -164,9 +164,7 @@ impl Estimator for MultiSampled {
     }
 
     fn irradiance(&self, gathered: &Gathered, view: &View) -> DVec3 {
-        let mut irradiance = DVec3::ZERO;
-        self.irradiances(&mut std::iter::once((*gathered, *view)), &mut |sum| irradiance = sum);
-        irradiance
+        batch::irradiance(gathered, view, |of, means| self.means(of, means))
     }
 
     fn irradiances<'a>(&self, hits: &mut dyn Iterator<Item = (Gathered<'a>, View)>, put: &mut dyn FnMut(DVec3)) {
