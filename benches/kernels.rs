@@ -13,7 +13,7 @@ use cusp::photons::irradiance::surface_area::SurfaceAreas;
 use cusp::photons::irradiance::{GlobalPhotons, IrradiancePyramid, PyramidSettings};
 use cusp::photons::kd_tree::Nearest;
 use cusp::photons::map::{FootprintLimits, MapParts, Query};
-use cusp::photons::overlap::Near;
+use cusp::photons::near::Near;
 use cusp::photons::{PhotonKind, PhotonMap, StoredPhoton};
 use cusp::render::Silent;
 use cusp::render::film::{Film, Rect};

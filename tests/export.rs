@@ -96,7 +96,7 @@ fn files_hold_what_the_window_shows() {
     let context = egui::Context::default();
     let mut workbench = finished(&context, session);
     // The brightest pixel has photons to list.
-    let first = workbench.gallery().of_estimator("regular").expect("an image").image();
+    let first = workbench.gallery().of_estimator("regular").expect("an image").pixels().to_image();
     let at = |i: u32| [i % 64, i / 64];
     let bright = (0..64 * 64).max_by(|a, b| first.pixels[*a].x.total_cmp(&first.pixels[*b].x)).expect("pixels") as u32;
     let pins = [[0, 63], at(bright)];
@@ -105,7 +105,7 @@ fn files_hold_what_the_window_shows() {
     assert_eq!(gravity, Gravity::Note, "{message}");
 
     for (i, name) in ["regular", "integrated"].into_iter().enumerate() {
-        let shown = workbench.gallery().of(&workbench.session().panels[i]).expect("an image").image().clone();
+        let shown = workbench.gallery().of(&workbench.session().panels[i]).expect("an image").pixels().to_image();
         assert!(shown.pixels.iter().any(|p| p.max_element() > 0.0));
         let written = read(&out.join(format!("{name}.exr")));
         assert_eq!(bits(&written), bits(&shown), "{name}");

@@ -139,7 +139,7 @@ fn a_scene_that_changes_on_disk_is_read_again() {
     let mut workbench = Workbench::new(&context, opened, None).expect("threads");
     assert_eq!(workbench.desk().recent.names(), [name]);
     run_until(&mut workbench, &context, Workbench::is_idle);
-    let shown = |w: &Workbench| w.gallery().of_estimator("regular").expect("an image").image().clone();
+    let shown = |w: &Workbench| w.gallery().of_estimator("regular").expect("an image").pixels().to_image();
     let before = shown(&workbench);
 
     let position = scene.lines().find(|l| l.starts_with("position")).expect("the camera's").to_owned();

@@ -13,6 +13,18 @@ pub(super) const LANES: usize = 8;
 /// The same number of each of [`LANES`] parallelograms.
 pub(super) type Lanes = [f32; LANES];
 
+/// Photons with the hits that see them, [`BATCH`] at most, as a structure of arrays.
+pub(super) trait Pairs: Default {
+    /// Number of them.
+    fn len(&self) -> usize;
+
+    /// Adds one, unless there are [`BATCH`] of them or it is sure to have no weight.
+    fn push(&mut self, photon: &MapPhoton, view: &View);
+
+    /// Forgets them.
+    fn clear(&mut self);
+}
+
 /// View footprints in the filter space of a photon each.
 pub(super) struct Parallelograms {
     /// Centres and half-edges by coordinate.
@@ -26,12 +38,24 @@ impl Default for Parallelograms {
     }
 }
 
-impl Parallelograms {
-    /// Number of them.
-    pub fn len(&self) -> usize {
+impl Pairs for Parallelograms {
+    fn len(&self) -> usize {
         self.count
     }
 
+    #[inline(always)]
+    fn push(&mut self, photon: &MapPhoton, view: &View) {
+        let corners = in_filter_space(photon, view);
+        // Written in any case: whether one is far is hard to foresee, and a branch that goes wrong costs more.
+        self.push_if(!is_far(&corners), corners);
+    }
+
+    fn clear(&mut self) {
+        self.count = 0;
+    }
+}
+
+impl Parallelograms {
     /// The number of which whole lanes can be made; the last ones hold what was there before.
     #[inline(always)]
     pub fn in_whole_lanes(&self) -> usize {
@@ -50,11 +74,6 @@ impl Parallelograms {
             }
             self.count += usize::from(counts);
         }
-    }
-
-    /// Forgets them.
-    pub fn clear(&mut self) {
-        self.count = 0;
     }
 
     /// Centre and half-edges of one.
@@ -97,20 +116,13 @@ pub(super) fn weight_by_mean(mean: f64, photon: &MapPhoton) -> f64 {
 
 /// Irradiance at each hit, as [`super::Estimator::irradiances`] has it, of an estimator whose weights come from means over
 /// the view footprint: `means` computes those of a batch.
-pub(super) fn irradiances<'a>(
+pub(super) fn irradiances<'a, P: Pairs>(
     hits: &mut dyn Iterator<Item = (Gathered<'a>, View)>,
     put: &mut dyn FnMut(DVec3),
-    means: impl Fn(&Parallelograms, &mut [f64; BATCH]),
+    means: impl Fn(&P, &mut [f64; BATCH]),
 ) {
-    let mut batch = Batch {
-        parallelograms: Parallelograms::default(),
-        photons: [None; BATCH],
-        ends: [0; BATCH],
-        hits: 0,
-        sum: DVec3::ZERO,
-        means,
-        put,
-    };
+    let mut batch =
+        Batch { pairs: P::default(), photons: [None; BATCH], ends: [0; BATCH], hits: 0, sum: DVec3::ZERO, means, put };
     for (gathered, view) in hits {
         batch.add(&gathered, &view);
     }
@@ -118,18 +130,14 @@ pub(super) fn irradiances<'a>(
 }
 
 /// The same at one hit, W/m².
-pub(super) fn irradiance(
-    gathered: &Gathered,
-    view: &View,
-    means: impl Fn(&Parallelograms, &mut [f64; BATCH]),
-) -> DVec3 {
+pub(super) fn irradiance<P: Pairs>(gathered: &Gathered, view: &View, means: impl Fn(&P, &mut [f64; BATCH])) -> DVec3 {
     let mut irradiance = DVec3::ZERO;
     irradiances(&mut std::iter::once((*gathered, *view)), &mut |sum| irradiance = sum, means);
     irradiance
 }
 
-struct Batch<'a, 'b, M> {
-    parallelograms: Parallelograms,
+struct Batch<'a, 'b, P, M> {
+    pairs: P,
     photons: [Option<&'a MapPhoton>; BATCH],
     /// Where hits end whose photons are all there.
     ends: [usize; BATCH],
@@ -140,20 +148,18 @@ struct Batch<'a, 'b, M> {
     put: &'b mut dyn FnMut(DVec3),
 }
 
-impl<'a, M: Fn(&Parallelograms, &mut [f64; BATCH])> Batch<'a, '_, M> {
+impl<'a, P: Pairs, M: Fn(&P, &mut [f64; BATCH])> Batch<'a, '_, P, M> {
     /// Adds a hit.
     fn add(&mut self, gathered: &Gathered<'a>, view: &View) {
         for &i in gathered.indices {
             let photon = &gathered.photons[i as usize];
-            let corners = in_filter_space(photon, view);
-            self.photons[self.parallelograms.len()] = Some(photon);
-            // Written in any case: whether one is far is hard to foresee, and a branch that goes wrong costs more.
-            self.parallelograms.push_if(!is_far(&corners), corners);
-            if self.parallelograms.len() == BATCH {
+            self.photons[self.pairs.len()] = Some(photon);
+            self.pairs.push(photon, view);
+            if self.pairs.len() == BATCH {
                 self.finish();
             }
         }
-        self.ends[self.hits] = self.parallelograms.len();
+        self.ends[self.hits] = self.pairs.len();
         self.hits += 1;
         if self.hits == BATCH {
             self.finish();
@@ -163,9 +169,9 @@ impl<'a, M: Fn(&Parallelograms, &mut [f64; BATCH])> Batch<'a, '_, M> {
     /// Hands over what the hits that have ended add up to, and keeps the sum of one that goes on.
     fn finish(&mut self) {
         let mut means = [0.0; BATCH];
-        (self.means)(&self.parallelograms, &mut means);
+        (self.means)(&self.pairs, &mut means);
         let mut ends = self.ends[..self.hits].iter().peekable();
-        let pairs = self.photons.iter().zip(means).take(self.parallelograms.len());
+        let pairs = self.photons.iter().zip(means).take(self.pairs.len());
         for (i, (photon, mean)) in pairs.enumerate() {
             while ends.next_if_eq(&&i).is_some() {
                 (self.put)(std::mem::take(&mut self.sum));
@@ -180,7 +186,7 @@ impl<'a, M: Fn(&Parallelograms, &mut [f64; BATCH])> Batch<'a, '_, M> {
         for _ in ends {
             (self.put)(std::mem::take(&mut self.sum));
         }
-        self.parallelograms.clear();
+        self.pairs.clear();
         self.hits = 0;
     }
 }

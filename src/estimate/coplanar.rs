@@ -6,16 +6,14 @@
 //! carry their parameters in the view footprint along, which maps the centroid back (eq. 66) without an inverse.
 
 use super::{Construction, Estimator, Gathered, Lookup, SamplingPoint, View, weighted_sum};
+use crate::estimate::batch::{self, BATCH, in_filter_space, weight_by_mean};
 use crate::estimate::clip::{self, ClippedPolygon, HalfPlane, MAX_CORNERS, MAX_VERTICES, SQUARE_VERTICES};
-use crate::estimate::kernel::silverman;
+use crate::estimate::coverage::{Pair, Pairs};
 use crate::estimate::parallelogram::mean_over_parallelogram;
 use crate::estimate::polygon::mean_over_part;
 use crate::estimate::settings::{Spec, SpecError};
 use crate::photons::MapPhoton;
-use glam::{DVec2, DVec3, Vec3};
-
-/// Cosine below which a photon's plane seen along the ray has no area that f32 could tell.
-const EDGE_ON: f64 = 1e-12;
+use glam::{DVec2, DVec3};
 
 /// How the photon's footprint is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -76,29 +74,8 @@ impl Coplanar {
     }
 
     /// Centre and half-edges of the view footprint in the photon's footprint, along the view ray; None if it is far off.
-    #[inline]
     pub fn projected(photon: &MapPhoton, view: &View) -> Option<[DVec2; 3]> {
-        // In f64: along a grazing ray the projection divides by next to nothing.
-        let (v, n) = (view.direction.as_dvec3(), photon.normal.as_dvec3());
-        let across = n.dot(v);
-        if across.abs() < EDGE_ON {
-            return None;
-        }
-        let rows = [photon.rows[0].as_dvec3(), photon.rows[1].as_dvec3()];
-        // The row times the projection, once for all three vectors.
-        let rows = rows.map(|r| r - n * (r.dot(v) / across));
-        let project = |x: Vec3| {
-            let x = x.as_dvec3();
-            photon.to_own(DVec2::new(rows[0].dot(x), rows[1].dot(x)))
-        };
-        let offset = view.query.center - photon.position;
-        let [a, b] = view.query.axes;
-        let (pc, pa, pb) = (project(offset), project(a), project(b));
-        let reach = pa.abs() + pb.abs();
-        if pc.x.abs() - reach.x >= 1.0 || pc.y.abs() - reach.y >= 1.0 {
-            return None;
-        }
-        Some([pc, pa, pb])
+        Pair::new(photon, view).projected()
     }
 
     /// A view footprint that [`Coplanar::projected`] gave, clipped by the photon's polygon; `N` must hold its vertices.
@@ -111,44 +88,55 @@ impl Coplanar {
         polygon
     }
 
-    fn over_area(&self, photon: &MapPhoton, view: &View) -> f64 {
+    /// Share of a projected view footprint inside the photon's polygon, and the centroid of that part in its parameters.
+    fn coverage_and_centroid(&self, projected: [DVec2; 3]) -> (f64, DVec2) {
         match self.shape {
-            Shape::Parallelogram => self.over_area_with::<SQUARE_VERTICES>(photon, view),
-            Shape::Ellipse(_) => self.over_area_with::<MAX_VERTICES>(photon, view),
+            Shape::Parallelogram => self.clipped::<SQUARE_VERTICES>(projected).coverage_and_centroid(),
+            Shape::Ellipse(_) => self.clipped::<MAX_VERTICES>(projected).coverage_and_centroid(),
         }
     }
 
-    #[inline]
-    fn over_area_with<const N: usize>(&self, photon: &MapPhoton, view: &View) -> f64 {
-        let Some(projected) = Self::projected(photon, view) else {
-            return 0.0;
+    /// Whether pairs are computed together, in lanes.
+    fn is_in_lanes(&self) -> bool {
+        self.shape == Shape::Parallelogram && self.weight == Weight::Centroid
+    }
+
+    /// What [`weight_by_mean`] takes of each pair of a batch.
+    fn weigh(&self, pairs: &Pairs, means: &mut [f64; BATCH]) {
+        pairs.weighed(means, |projected| self.coverage_and_centroid(projected));
+    }
+
+    fn over_area(&self, photon: &MapPhoton, view: &View) -> f64 {
+        let pair = Pair::new(photon, view);
+        let mean = match (self.weight, self.shape) {
+            (Weight::Centroid, Shape::Parallelogram) => pair.weighed(|p| self.coverage_and_centroid(p)),
+            (Weight::Centroid, Shape::Ellipse(_)) => {
+                let Some(projected) = pair.projected() else { return 0.0 };
+                let (coverage, centroid) = self.coverage_and_centroid(projected);
+                if coverage > 0.0 { coverage * pair.kernel_at(centroid) } else { 0.0 }
+            }
+            (Weight::Mean, Shape::Parallelogram) => self.mean::<SQUARE_VERTICES>(&pair, photon, view),
+            (Weight::Mean, Shape::Ellipse(_)) => self.mean::<MAX_VERTICES>(&pair, photon, view),
         };
+        weight_by_mean(mean, photon)
+    }
+
+    /// Mean of `(1 - u)²` over the covered part, times its share of the view footprint.
+    fn mean<const N: usize>(&self, pair: &Pair, photon: &MapPhoton, view: &View) -> f64 {
+        let Some(projected) = pair.projected() else { return 0.0 };
         let polygon = self.clipped::<N>(projected);
-        let (coverage, centroid) = polygon.coverage_and_centroid();
-        if coverage <= 0.0 {
+        let vertices = polygon.vertices();
+        if polygon.coverage_and_centroid().0 <= 0.0 {
             return 0.0;
         }
-        let offset = view.query.center - photon.position;
-        let [a, b] = view.query.axes;
-        let filtered = match self.weight {
-            Weight::Centroid => {
-                let x = offset + a * centroid.x as f32 + b * centroid.y as f32;
-                coverage * silverman(f64::from(photon.to_filter(x).length_squared()))
-            }
-            Weight::Mean => {
-                let (fc, fa, fb) = (photon.to_filter(offset), photon.to_filter(a), photon.to_filter(b));
-                let mut parameters = [DVec2::ZERO; N];
-                let mut buffer = [DVec2::ZERO; N];
-                let vertices = polygon.vertices();
-                for (p, v) in parameters.iter_mut().zip(vertices) {
-                    *p = v.parameter;
-                }
-                let parts = &parameters[..vertices.len()];
-                3.0 * mean_over_part(fc, fa, fb, parts, &mut buffer)
-                    .unwrap_or_else(|| mean_over_parallelogram(fc, fa, fb))
-            }
-        };
-        filtered * f64::from(photon.inverse_area)
+        let [c, a, b] = in_filter_space(photon, view);
+        let mut parameters = [DVec2::ZERO; N];
+        let mut buffer = [DVec2::ZERO; N];
+        for (p, v) in parameters.iter_mut().zip(vertices) {
+            *p = v.parameter;
+        }
+        let parts = &parameters[..vertices.len()];
+        mean_over_part(c, a, b, parts, &mut buffer).unwrap_or_else(|| mean_over_parallelogram(c, a, b))
     }
 }
 
@@ -187,7 +175,19 @@ impl Estimator for Coplanar {
     }
 
     fn irradiance(&self, gathered: &Gathered, view: &View) -> DVec3 {
+        if self.is_in_lanes() {
+            return batch::irradiance(gathered, view, |of, means| self.weigh(of, means));
+        }
         weighted_sum(gathered, |p| self.over_area(p, view))
+    }
+
+    fn irradiances<'a>(&self, hits: &mut dyn Iterator<Item = (Gathered<'a>, View)>, put: &mut dyn FnMut(DVec3)) {
+        if self.is_in_lanes() {
+            return batch::irradiances(hits, put, |of, means| self.weigh(of, means));
+        }
+        for (gathered, view) in hits {
+            put(self.irradiance(&gathered, &view));
+        }
     }
 
     /// The covered part, and as its only point the centroid at which `weight=centroid` evaluates the kernel.

@@ -4,6 +4,7 @@ mod batch;
 pub mod clip;
 pub mod construction;
 pub mod coplanar;
+mod coverage;
 pub mod density;
 pub mod final_gathering;
 pub mod integrated;

@@ -3,7 +3,7 @@
 //! As an integral over a polygon, but for four edges that come in pairs; and without a branch, so that many parallelograms
 //! are integrated at once in lanes. Whatever a case needs is computed for all, and what does not hold is not taken.
 
-use crate::estimate::batch::{BATCH, Parallelograms};
+use crate::estimate::batch::{BATCH, Pairs, Parallelograms};
 use crate::estimate::polygon::{GAUSS, SHORT, THIN};
 use crate::math::angle::angle;
 use glam::{DVec2, DVec3, Vec3};

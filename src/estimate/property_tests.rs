@@ -6,7 +6,7 @@ use crate::estimate::registry::{ESTIMATORS, estimator};
 use crate::estimate::{Estimator, Gathered, Lookup, View};
 use crate::math::rgb::Rgb;
 use crate::photons::map::{FootprintLimits, MapParts, Query};
-use crate::photons::overlap::Near;
+use crate::photons::near::Near;
 use crate::photons::{MapPhoton, Photon, PhotonMap};
 use glam::{DVec2, Quat, Vec3};
 use proptest::prelude::*;

@@ -4,6 +4,7 @@ pub mod angle;
 pub mod elementary;
 pub mod frame;
 pub mod hash;
+pub mod lanes;
 pub mod octahedron;
 pub mod rgb;
 pub mod sequence;

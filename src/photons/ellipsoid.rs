@@ -1,42 +1,87 @@
 //! Whether a view footprint meets a photon's ellipsoid.
 
+use crate::math::lanes::{Lanes, Vec3Lanes};
 use crate::photons::MapPhoton;
 use crate::photons::map::Query;
 use glam::{DVec3, Vec3};
+use pulp::Simd;
 
 /// What f32 may get wrong of squared lengths, of their sum.
 const UNSURE: f32 = 1e-5;
 
-/// Whether the query's parallelogram comes nearer than 1 to the photon in filter space.
-pub fn meets_unit_ball(p: &MapPhoton, query: &Query) -> bool {
-    meets(p.to_filter(query.center - p.position), || query.axes.map(|v| p.to_filter(v)))
+/// What 32 bits tell about a parallelogram and the unit ball.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u32)]
+pub enum Verdict {
+    /// It misses the ball.
+    Misses = 0,
+    /// It meets the ball.
+    Meets = 1,
+    /// It takes more digits.
+    Unsure = 2,
 }
 
-/// Whether the parallelogram about `c`, whose half-edges are asked for where they count, comes nearer than 1 to the origin.
+/// Whether the query's parallelogram comes nearer than 1 to the photon in filter space.
+pub fn meets_unit_ball(p: &MapPhoton, query: &Query) -> bool {
+    let [a, b] = query.axes.map(|v| p.to_filter(v));
+    meets(p.to_filter(query.center - p.position), a, b)
+}
+
+/// The same where [`verdict`] is unsure.
+pub fn exactly_meets(p: &MapPhoton, query: &Query) -> bool {
+    let [a, b] = query.axes.map(|v| p.to_filter(v));
+    nearest_on_parallelogram(p.to_filter(query.center - p.position), a, b) < 1.0
+}
+
+/// Whether the parallelogram about `c` with half-edges `a`, `b` comes nearer than 1 to the origin.
 #[inline]
-fn meets(c: Vec3, axes: impl FnOnce() -> [Vec3; 2]) -> bool {
+fn meets(c: Vec3, a: Vec3, b: Vec3) -> bool {
+    match verdict(c, a, b) {
+        Verdict::Misses => false,
+        Verdict::Meets => true,
+        Verdict::Unsure => nearest_on_parallelogram(c, a, b) < 1.0,
+    }
+}
+
+/// The same as far as f32 decides it by more than its rounding: by the plane across the way to the centre, and by a point
+/// that is near the nearest.
+#[inline]
+fn verdict(c: Vec3, a: Vec3, b: Vec3) -> Verdict {
     let cc = c.length_squared();
     if cc < 1.0 {
-        return true;
+        return Verdict::Meets;
     }
-    let [a, b] = axes();
     let (aa, bb) = (a.length_squared(), b.length_squared());
     let reach = 1.0 + aa.sqrt() + bb.sqrt();
-    if cc >= reach * reach {
-        return false;
-    }
-    // In f32 what is decided by more than its rounding: by the plane across the way to the centre, and by a point that is
-    // near the nearest.
     let (ca, cb) = (c.dot(a), c.dot(b));
     let rounding = UNSURE * (1.0 + cc + aa + bb);
-    if cc - ca.abs() - cb.abs() > cc.sqrt() + rounding {
-        return false;
+    if cc >= reach * reach || cc - ca.abs() - cb.abs() > cc.sqrt() + rounding {
+        return Verdict::Misses;
     }
     let near = c + a * (-ca / aa).clamp(-1.0, 1.0) + b * (-cb / bb).clamp(-1.0, 1.0);
-    if near.length_squared() < 1.0 - rounding {
-        return true;
-    }
-    nearest_on_parallelogram(c, a, b) < 1.0
+    if near.length_squared() < 1.0 - rounding { Verdict::Meets } else { Verdict::Unsure }
+}
+
+/// [`verdict`] of each lane, as its number: one may be unsure where the other is not.
+#[inline(always)]
+pub fn verdicts_of<S: Simd>(simd: S, c: Vec3Lanes<S>, a: Vec3Lanes<S>, b: Vec3Lanes<S>) -> S::u32s {
+    let (zero, one) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, 1.0));
+    let (aa, bb, cc) = (a.dot(a), b.dot(b), c.dot(c));
+    let (ca, cb) = (c.dot(a), c.dot(b));
+    let reach = one + aa.sqrt() + bb.sqrt();
+    let rounding = Lanes::splat(simd, UNSURE) * (one + cc + aa + bb);
+    let is_beyond = (reach * reach).at_most(cc);
+    let misses = simd.or_m32s(is_beyond, (cc.sqrt() + rounding).less(cc - ca.abs() - cb.abs()));
+    // A vector without length goes nowhere.
+    let within = |x: Lanes<S>| {
+        let x = x.or((zero - one).less(x), zero - one);
+        x.or(x.less(one), one)
+    };
+    let near = c + a * within(-ca / aa) + b * within(-cb / bb);
+    let meets = near.dot(near).less(one - rounding);
+    let [no, yes, unsure] = [Verdict::Misses, Verdict::Meets, Verdict::Unsure].map(|v| simd.splat_u32s(v as u32));
+    let outside = simd.select_u32s(misses, no, simd.select_u32s(meets, yes, unsure));
+    simd.select_u32s(cc.less(one), yes, outside)
 }
 
 /// Squared distance of the parallelogram `c + s a + t b`, `|s|, |t| ≤ 1`, from the origin.
@@ -84,7 +129,7 @@ mod tests {
                 continue;
             }
             let exact = nearest < 1.0;
-            assert_eq!(meets(c, || [a, b]), exact, "{c} {a} {b}");
+            assert_eq!(meets(c, a, b), exact, "{c} {a} {b}");
             let near = c.length() < 1.0 + a.length() + b.length() && c.length() > 1.0;
             met += u32::from(near && exact);
             missed += u32::from(near && !exact);

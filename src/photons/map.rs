@@ -5,7 +5,8 @@ use crate::photons::Photon;
 use crate::photons::ellipsoid::meets_unit_ball;
 use crate::photons::footprint::FilterTransform;
 use crate::photons::kd_tree::{self, KdTree, Nearest, NearestQuery};
-use crate::photons::overlap::{self, Block, LANES, Near, OverlapTree, packing_order};
+use crate::photons::near::Near;
+use crate::photons::overlap::{self, Block, LANES, OverlapTree, packing_order};
 use crate::photons::photon::Footprinted;
 use glam::{DVec2, Vec2, Vec3};
 use rayon::prelude::*;
@@ -41,7 +42,7 @@ pub struct MapPhoton {
 
 impl MapPhoton {
     /// A place for a photon.
-    const NONE: Self = Self {
+    pub(crate) const NONE: Self = Self {
         position: Vec3::ZERO,
         inverse_reach: 0.0,
         rows: [Vec3::ZERO; 2],
@@ -105,7 +106,7 @@ impl MapPhoton {
     /// Whether it lights the side of a surface that has this unit normal.
     #[inline]
     pub fn lights(&self, normal: Vec3) -> bool {
-        self.normal.dot(normal) >= NORMAL_AGREEMENT && self.direction.dot(normal) < 0.0
+        (self.normal.dot(normal) >= NORMAL_AGREEMENT) & (self.direction.dot(normal) < 0.0)
     }
 }
 
@@ -270,8 +271,10 @@ impl PhotonMap {
     /// Finds what queries near each other have in common, if `near` is not for the first of them already: with it, the
     /// methods below are faster. What they find is the same.
     pub fn gather_near(&self, queries: impl Iterator<Item = Query>, near: &mut Near) {
-        if let Some(tree) = &self.overlap {
-            tree.gather_near(queries.map(bounds), near);
+        if let Some(tree) = &self.overlap
+            && let Some((low, high)) = near.starts(queries.map(bounds))
+        {
+            tree.while_between(low, high, |i| near.push(i, &self.photons[i as usize], tree.corners_of(i)));
         }
     }
 
@@ -280,7 +283,10 @@ impl PhotonMap {
     /// Nothing is found in a map without footprint hierarchy.
     pub fn overlapping_point(&self, query: &Query, near: &Near, out: &mut Vec<u32>) {
         let Some(tree) = &self.overlap else { return };
-        tree.in_box_near(near, query.center, Vec3::ZERO, |i| {
+        if near.find::<true>(query, (query.center, Vec3::ZERO), out) {
+            return;
+        }
+        tree.in_box(query.center, Vec3::ZERO, |i| {
             let p = &self.photons[i as usize];
             if p.to_filter(query.center - p.position).length_squared() < 1.0 && p.lights(query.normal) {
                 out.push(i);
@@ -294,7 +300,10 @@ impl PhotonMap {
     pub fn overlapping_parallelogram(&self, query: &Query, near: &Near, out: &mut Vec<u32>) {
         let Some(tree) = &self.overlap else { return };
         let (center, half) = bounds(*query);
-        tree.in_box_near(near, center, half, |i| {
+        if near.find::<false>(query, (center, half), out) {
+            return;
+        }
+        tree.in_box(center, half, |i| {
             let p = &self.photons[i as usize];
             if p.lights(query.normal) && meets_unit_ball(p, query) {
                 out.push(i);

@@ -6,6 +6,7 @@ pub mod footprint;
 pub mod irradiance;
 pub mod kd_tree;
 pub mod map;
+pub mod near;
 pub mod overlap;
 pub mod path;
 pub mod photon;

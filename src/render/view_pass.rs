@@ -8,7 +8,7 @@ use crate::math::hash::mix;
 use crate::math::rgb::{Rgb, in_f32};
 use crate::math::sequence::{Sampling, Sequence};
 use crate::photons::kd_tree::Nearest;
-use crate::photons::overlap::Near;
+use crate::photons::near::Near;
 use crate::photons::{PhotonKind, PhotonMap};
 use crate::render::cells::{cells_of_pass, parts_of_pass};
 use crate::render::film::{Image, Rect};

@@ -6,6 +6,7 @@ use super::areas::Areas;
 use super::desk::{Desk, Finding, Kind, Step};
 use super::document::{Change, Document, Opened};
 use super::gallery::Gallery;
+use super::gallery::tiled::TiledImage;
 use super::inspector::{FoundPath, Inspected};
 use super::layout::{self, Pane};
 use super::messages::Messages;
@@ -203,20 +204,26 @@ impl Workbench {
                 }
             },
             Finding::Reference(Ok(reference)) => {
-                self.gallery.set_reference(reference.as_ref().map(|r| &r.image));
-                self.desk.reference = reference.map(Arc::new);
+                let (reference, image) = reference.unzip();
+                self.gallery.set_reference(image);
+                self.desk.reference = reference;
                 self.desk.errors.clear();
                 self.after_pass();
             }
             Finding::Reference(Err(why)) => self.messages.error(why),
             Finding::Image(path, Ok(image)) => {
-                self.gallery.put_file(&path, &image);
+                self.gallery.put_file(&path, image);
                 let panels = &mut self.document.session.panels;
                 if !panels.iter().any(|p| p.image.as_ref() == Some(&path)) {
                     panels.push(Panel { image: Some(path), ..Panel::of("") });
                 }
             }
             Finding::Image(_, Err(why)) => self.messages.error(why),
+            // A small step would only make the images flicker.
+            Finding::Exposure(stops) if self.desk.untimed || (stops - self.desk.auto_exposure).abs() > 0.1 => {
+                self.desk.auto_exposure = stops;
+            }
+            Finding::Exposure(_) => {}
             Finding::Areas(areas) => self.desk.areas = areas,
             Finding::Values(panel, Ok(values)) => drop(self.gallery.values.insert(panel, values)),
             Finding::Values(panel, Err(why)) => {
@@ -257,12 +264,18 @@ impl Workbench {
         let edited = self.document.is_edited();
         let (scene, reference, mask) = (session.scene.clone(), session.reference.clone(), session.mask.clone());
         self.analysis.ask(Kind::Reference, move || {
-            Finding::Reference(match reference {
+            let read = match reference {
                 Some(path) => Reference::from_files(path.as_ref(), mask.as_ref().map(|m| m.as_ref())).map(Some),
                 // The stored image shows the scene as it is built in.
                 None if edited => Ok(None),
                 None => Reference::built_in(&scene),
-            })
+            };
+            Finding::Reference(read.map(|found| {
+                found.map(|reference| {
+                    let image = TiledImage::of(&reference.image);
+                    (Arc::new(reference), image)
+                })
+            }))
         });
     }
 
@@ -296,16 +309,14 @@ impl Workbench {
         self.analysis.ask(Kind::Open, move || Finding::Opened(Box::new(Opened::new(session)), step));
     }
 
-    /// Exposure by the last panel that has an image.
+    /// Asks for the exposure that suits the last panel that has an image.
     fn expose(&mut self) {
         let panels = &self.document.session.panels;
         let shown = panels.iter().rev().filter_map(|p| self.gallery.of(p)).find(|i| i.has_pixels());
-        if let Some(image) = shown {
-            let exposure = crate::export::tone::auto_exposure(image.image()).log2();
-            // A small step would only make the images flicker.
-            if self.desk.untimed || (exposure - self.desk.auto_exposure).abs() > 0.1 {
-                self.desk.auto_exposure = exposure;
-            }
+        if let Some(image) = shown.map(|i| i.pixels().clone()) {
+            self.analysis.ask(Kind::Exposure, move || {
+                Finding::Exposure(crate::export::tone::auto_exposure(&image.to_image()).log2())
+            });
         }
     }
 
@@ -329,13 +340,13 @@ impl Workbench {
             };
             if passes > 0 && self.desk.error_of(name).is_none_or(|e| e.passes < passes) {
                 let seconds = progress.photon_seconds[i] + progress.estimator_seconds[i].total();
-                images.push((name.clone(), passes, seconds, live.image().clone()));
+                images.push((name.clone(), passes, seconds, live.pixels().clone()));
             }
         }
         let generation = job.generation;
         self.analysis.ask(Kind::Errors, move || {
             let points = images.into_iter().filter_map(|(name, passes, seconds, image)| {
-                let error = reference.error_of(&image).ok()?;
+                let error = reference.error_of(&image.to_image()).ok()?;
                 Some((name, super::desk::ErrorPoint { passes, seconds, error }))
             });
             Finding::Errors(generation, points.collect())

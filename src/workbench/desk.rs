@@ -3,6 +3,7 @@
 use super::actions::Action;
 use super::areas::Areas;
 use super::dialogs::Dialogs;
+use super::gallery::tiled::TiledImage;
 use super::gallery::values::{Origin, Values};
 use super::inspector::{FoundPath, Inspected, Inspector};
 use super::overlays::estimates::{Shown, VisibleEstimates};
@@ -23,6 +24,8 @@ pub enum Kind {
     Reference,
     /// Read an image.
     Image(String),
+    /// The exposure that suits the images.
+    Exposure,
     /// Errors of all panels.
     Errors,
     /// Histogram of footprint areas.
@@ -46,9 +49,11 @@ pub enum Finding {
     /// A scene for a session, or why there is none; whether it is a step of the history.
     Opened(Box<Result<super::document::Opened, String>>, Step),
     /// The reference that belongs to a session's scene, if there is one.
-    Reference(Result<Option<Reference>, String>),
+    Reference(Result<Option<(Arc<Reference>, TiledImage)>, String>),
     /// An image from a file.
-    Image(String, Result<crate::render::film::Image, String>),
+    Image(String, Result<TiledImage, String>),
+    /// The exposure that suits the images, stops.
+    Exposure(f32),
     /// Errors by estimator, of a generation.
     Errors(u64, Vec<(String, ErrorPoint)>),
     /// Histogram of footprint areas.

@@ -113,11 +113,12 @@ fn nudge(session: &mut Session, step: [i32; 2], gallery: &Gallery) {
 mod tests {
     use super::*;
     use crate::render::film::Image;
+    use crate::workbench::gallery::tiled::TiledImage;
 
     #[test]
     fn pins_move_inside_the_image() {
         let (mut session, mut desk, mut gallery) = (Session::of("ring"), Desk::default(), Gallery::default());
-        gallery.put_file("a", &Image::black([10, 5]));
+        gallery.put_file("a", TiledImage::of(&Image::black([10, 5])));
         session.panels = vec![Panel { image: Some("a".into()), ..Panel::of("") }];
         let mut run = |action: Action| {
             apply(&action, &mut session, &mut desk, &gallery);

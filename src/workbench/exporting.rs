@@ -2,6 +2,7 @@
 
 use super::app::Workbench;
 use super::desk::{Finding, Kind};
+use super::gallery::tiled::TiledImage;
 use super::gallery::values::Values;
 use super::inspector::{Inspected, rays, summary};
 use super::theme::panel_color;
@@ -30,7 +31,7 @@ type MakeValues = Box<dyn FnOnce() -> Result<Values, String> + Send>;
 struct Shown {
     panel: Panel,
     color: [u8; 3],
-    image: Image,
+    image: TiledImage,
     passes: u32,
     fresh: bool,
     values: Option<MakeValues>,
@@ -75,7 +76,7 @@ impl Workbench {
             panels.push(Shown {
                 panel: panel.clone(),
                 color: [r, g, b],
-                image: live.image().clone(),
+                image: live.pixels().clone(),
                 passes: live.passes,
                 fresh: live.is_fresh(),
                 values: self.values_of(&session, index),
@@ -116,7 +117,7 @@ impl Workbench {
             }
             None if shows_difference(session, index) => {
                 let stops = if session.tone.auto { self.desk.auto_exposure } else { session.tone.exposure };
-                let reference = self.desk.reference.as_deref();
+                let reference = self.desk.reference.as_ref();
                 views::difference_work(session, &self.gallery, reference, panel, stops, self.render.passes_seen)
                     .map(|(_, work)| work)
             }
@@ -174,6 +175,7 @@ impl Export {
     /// A panel's radiance, the numbers that it shows, and its colour.
     fn pictures(&mut self, shown: Shown) -> Result<(Picture, Option<Picture>, [u8; 3]), String> {
         let Shown { panel, color, image, passes, fresh, values, range } = shown;
+        let image = image.to_image();
         let title = panel.image.clone().unwrap_or_else(|| panel.estimator.clone());
         let error = if panel.image.is_none() { self.error_of(&image) } else { None };
         if let Some(error) = error {

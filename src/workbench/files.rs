@@ -3,6 +3,7 @@
 use super::app::Workbench;
 use super::desk::{Finding, Kind, Step};
 use super::dialogs::Purpose;
+use super::gallery::tiled::TiledImage;
 use crate::export::session::Session;
 use crate::export::whole_file;
 use std::path::Path;
@@ -41,7 +42,8 @@ impl Workbench {
         let path = path.to_owned();
         self.desk.asked_images.insert(path.clone());
         self.analysis.ask(Kind::Image(path.clone()), move || {
-            let read = crate::measure::image_file::read(path.as_ref()).map_err(|e| e.to_string());
+            let read = crate::measure::image_file::read(path.as_ref());
+            let read = read.map(|image| TiledImage::of(&image)).map_err(|e| e.to_string());
             Finding::Image(path, read)
         });
     }

@@ -124,7 +124,7 @@ impl Render {
                 Event::TileDone { rect, images, .. } => {
                     self.first_tile.get_or_insert_with(|| self.started.elapsed());
                     self.tiles += 1;
-                    gallery.tile(rect, &images);
+                    gallery.tile(rect, images);
                 }
                 Event::DraftDone { .. } => self.drafts_seen += 1,
                 Event::PassDone { progress, .. } => {

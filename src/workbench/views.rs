@@ -3,13 +3,13 @@
 use super::app::Workbench;
 use super::desk::{Finding, Kind};
 use super::gallery::Gallery;
+use super::gallery::tiled::TiledImage;
 use super::gallery::values::{Origin, Values};
 use super::overlays::estimates::VisibleEstimates;
 use super::overlays::photons::VisiblePhotons;
 use super::render::Render;
 use crate::export::session::{Mode, Panel, Session};
 use crate::measure::Reference;
-use crate::render::film::Image;
 use crate::render::heatmap::Heatmap;
 use std::sync::Arc;
 
@@ -23,15 +23,20 @@ pub fn shows_difference(session: &Session, index: usize) -> bool {
     session.comparison.mode == Mode::Difference && session.comparison.with != Some(index)
 }
 
+/// What panels are compared with.
+enum OtherSide {
+    Panel(TiledImage),
+    Reference(Arc<Reference>),
+}
+
 /// What the panels are compared with, and the number of its last change.
-pub fn other_side<'a>(
-    session: &Session,
-    gallery: &'a Gallery,
-    reference: Option<&'a Reference>,
-) -> Option<(&'a Image, u64)> {
+fn other_side(session: &Session, gallery: &Gallery, reference: Option<&Arc<Reference>>) -> Option<(OtherSide, u64)> {
     match session.comparison.with {
-        Some(i) => session.panels.get(i).and_then(|p| gallery.of(p)).map(|l| (l.image(), l.version())),
-        None => reference.map(|r| (&r.image, 0)),
+        Some(i) => {
+            let live = gallery.of(session.panels.get(i)?)?;
+            Some((OtherSide::Panel(live.pixels().clone()), live.version()))
+        }
+        None => reference.map(|r| (OtherSide::Reference(Arc::clone(r)), 0)),
     }
 }
 
@@ -80,7 +85,7 @@ impl Workbench {
                 Some(kind) => heatmap_work(&self.render, panel, kind),
                 None if shows_difference(session, index) => {
                     let stops = if session.tone.auto { self.desk.auto_exposure } else { session.tone.exposure };
-                    let reference = self.desk.reference.as_deref();
+                    let reference = self.desk.reference.as_ref();
                     difference_work(session, &self.gallery, reference, panel, stops, self.render.passes_seen)
                 }
                 None => {
@@ -121,7 +126,7 @@ pub(super) fn heatmap_work(render: &Render, panel: &Panel, kind: Heatmap) -> Opt
 pub(super) fn difference_work(
     session: &Session,
     gallery: &Gallery,
-    reference: Option<&Reference>,
+    reference: Option<&Arc<Reference>>,
     panel: &Panel,
     stops: f32,
     passes_seen: u64,
@@ -135,6 +140,13 @@ pub(super) fn difference_work(
     let is_flip = kind == crate::measure::difference::Difference::Flip;
     let bits = if is_flip { stops.to_bits() } else { 0 };
     let origin = Origin::Difference(kind, version, with, bits);
-    let (image, other, made) = (live.image().clone(), other.clone(), origin.clone());
-    Some((origin, Box::new(move || Values::difference(&image, &other, kind, stops, made))))
+    let (image, made) = (live.pixels().clone(), origin.clone());
+    let work = move || {
+        let image = image.to_image();
+        match other {
+            OtherSide::Panel(other) => Values::difference(&image, &other.to_image(), kind, stops, made),
+            OtherSide::Reference(reference) => Values::difference(&image, &reference.image, kind, stops, made),
+        }
+    };
+    Some((origin, Box::new(work)))
 }

@@ -140,7 +140,7 @@ fn differences_are_those_of_the_files() {
     let mut window = open(session);
     for (i, image) in images.iter().enumerate() {
         let panel = &window.state().session().panels[i];
-        same_bits(window.state().gallery().of(panel).expect("rendered").image(), image, &panel.estimator);
+        same_bits(&window.state().gallery().of(panel).expect("rendered").pixels().to_image(), image, &panel.estimator);
     }
     for kind in [Difference::Signed, Difference::Absolute, Difference::Relative, Difference::Flip] {
         window.state_mut().session_mut().comparison.difference = kind;

@@ -184,7 +184,7 @@ pub fn same_as_fresh(window: &Window) {
         let name = estimator.name();
         let live = window.state().gallery().of_estimator(&name).expect("it has a panel");
         assert!(live.is_fresh(), "{name}");
-        same_bits(live.image(), &film.image(), &name);
+        same_bits(&live.pixels().to_image(), &film.image(), &name);
     }
 }
 

@@ -7,7 +7,7 @@ use crate::estimate::Gathered;
 use crate::math::rgb::Rgb;
 use crate::photons::kd_tree::Nearest;
 use crate::photons::map::{FootprintLimits, MapParts, Query};
-use crate::photons::overlap::Near;
+use crate::photons::near::Near;
 use crate::photons::{Photon, PhotonMap};
 use crate::render::film::Rect;
 use crate::render::plan::Slot;

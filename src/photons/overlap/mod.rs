@@ -12,7 +12,7 @@ pub(super) use curve::packing_order;
 use glam::Vec3;
 use pulp::Arch;
 use rayon::prelude::*;
-use walk::{DEEPEST, Scan, Walk};
+use walk::{DEEPEST, Walk};
 
 /// Boxes that are tested at once.
 pub(super) const LANES: usize = 8;
@@ -60,38 +60,6 @@ impl Block {
             Vec3::from_array(std::array::from_fn(|i| least(&self.low[i]))),
             Vec3::from_array(std::array::from_fn(|i| largest(&self.high[i]))),
         )
-    }
-}
-
-/// Blocks beyond which boxes have too many in common for a list of them to be of use.
-const CROWDED: usize = 256;
-
-/// What queries near each other have in common: the blocks of entries that may meet any of them. The way down through the
-/// tree is gone once for all.
-#[derive(Clone, Debug)]
-pub struct Near {
-    /// The box around them.
-    low: Vec3,
-    high: Vec3,
-    blocks: Vec<u32>,
-    is_crowded: bool,
-}
-
-impl Default for Near {
-    fn default() -> Self {
-        Self { low: Vec3::INFINITY, high: Vec3::NEG_INFINITY, blocks: Vec::new(), is_crowded: false }
-    }
-}
-
-impl Near {
-    /// Forgets for what it was gathered: it must not be used for another tree.
-    pub fn clear(&mut self) {
-        (self.low, self.high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
-    }
-
-    /// Whether it was gathered for that box.
-    fn holds(&self, low: Vec3, high: Vec3) -> bool {
-        self.low.cmple(low).all() && self.high.cmpge(high).all()
     }
 }
 
@@ -143,71 +111,36 @@ impl OverlapTree {
         &self.order
     }
 
-    /// Calls `visit` with the entries whose box holds the point, in their order.
-    #[inline]
-    pub fn at_point(&self, point: Vec3, visit: impl FnMut(u32)) {
-        self.between(point, point, visit);
-    }
-
     /// Calls `visit` with the entries whose box meets the box of that centre and half-size, in their order.
     #[inline]
-    pub fn in_box(&self, center: Vec3, half: Vec3, visit: impl FnMut(u32)) {
+    pub fn in_box(&self, center: Vec3, half: Vec3, mut visit: impl FnMut(u32)) {
         let (low, high) = corners((center, half));
-        self.between(low, high, visit);
+        self.while_between(low, high, |entry| {
+            visit(entry);
+            true
+        });
     }
 
+    /// The same for a box by its corners, as long as `visit` wants more.
     #[inline]
-    fn between(&self, low: Vec3, high: Vec3, visit: impl FnMut(u32)) {
+    pub(super) fn while_between(&self, low: Vec3, high: Vec3, visit: impl FnMut(u32) -> bool) {
         if !self.levels.is_empty() {
-            let mut visit = visit;
-            let visit = |entry| {
-                visit(entry);
-                true
-            };
-            Arch::new().dispatch(Walk { tree: self, low, high, bottom: 0, visit });
+            Arch::new().dispatch(Walk { tree: self, low, high, visit });
         }
     }
 
-    /// Finds what boxes that lie near each other have in common, by centres and half-sizes, for
-    /// [`OverlapTree::in_box_near`]; nothing to do if `near` is for the first of them. What is found does not depend on it,
-    /// and if they lie far apart it is of no use.
-    pub fn gather_near(&self, mut boxes: impl Iterator<Item = Bounds>, near: &mut Near) {
-        let Some(first) = boxes.next() else { return };
-        let (low, high) = corners(first);
-        if near.holds(low, high) {
-            return;
-        }
-        let around = |all: (Vec3, Vec3), b: (Vec3, Vec3)| (all.0.min(b.0), all.1.max(b.1));
-        (near.low, near.high) = boxes.map(corners).fold((low, high), around);
-        near.blocks.clear();
-        near.is_crowded = false;
-        if !self.levels.is_empty() {
-            let visit = |block| {
-                near.is_crowded = near.blocks.len() == CROWDED;
-                if !near.is_crowded {
-                    near.blocks.push(block);
-                }
-                !near.is_crowded
-            };
-            Arch::new().dispatch(Walk { tree: self, low: near.low, high: near.high, bottom: 1, visit });
-        }
-    }
-
-    /// The same as [`OverlapTree::in_box`], faster for a box that `near` was gathered for.
+    /// Corners of an entry's box, as it is tested.
     #[inline]
-    pub fn in_box_near(&self, near: &Near, center: Vec3, half: Vec3, visit: impl FnMut(u32)) {
-        let (low, high) = corners((center, half));
-        if near.is_crowded || !near.holds(low, high) {
-            self.between(low, high, visit);
-        } else {
-            Arch::new().dispatch(Scan { tree: self, among: &near.blocks, low, high, visit });
-        }
+    pub(super) fn corners_of(&self, entry: u32) -> (Vec3, Vec3) {
+        let (block, lane) = (&self.blocks[entry as usize / LANES], entry as usize % LANES);
+        let of = |x: &[[f32; LANES]; 3]| Vec3::from_array(x.each_ref().map(|x| x[lane]));
+        (of(&block.low), of(&block.high))
     }
 }
 
 /// Corners of a box, one unit in the last place out on each side: so it keeps what it holds.
 #[inline]
-fn corners((center, half): Bounds) -> (Vec3, Vec3) {
+pub(super) fn corners((center, half): Bounds) -> (Vec3, Vec3) {
     let half = half * (1.0 + 4.0 * f32::EPSILON) + center.abs() * f32::EPSILON;
     (center - half, center + half)
 }

@@ -9,7 +9,7 @@ fn heaps_of_the_same_box_are_found() {
         let boxes: Vec<(Vec3, Vec3)> = (0..100_000).map(|i| (place(i), Vec3::splat(0.25))).collect();
         let tree = OverlapTree::new(&boxes);
         let mut found = Vec::new();
-        tree.at_point(place(heaps - 1), |entry| found.push(tree.order()[entry as usize]));
+        tree.in_box(place(heaps - 1), Vec3::ZERO, |entry| found.push(tree.order()[entry as usize]));
         found.sort_unstable();
         let expected: Vec<u32> = (0..100_000).filter(|i| i % heaps == heaps - 1).collect();
         assert_eq!(found, expected, "{heaps} heaps");
@@ -49,46 +49,12 @@ fn what_meets_a_box_is_found_once() {
     }
 }
 
-/// Boxes that were looked up together find what each finds alone: those near each other, those far apart, which have too
-/// much in common for a list, and one that nothing was gathered for.
-#[test]
-fn boxes_near_each_other_find_what_each_finds_alone() {
-    let mut crowded = 0;
-    for n in [0u64, 1, 8, 9, 500, 3000, 40_000] {
-        let sequence = Sequence::new(Sampling::Random, n);
-        let place = |i: u64, set: u32, spread: f32| {
-            let x = sequence.four(i, set);
-            (Vec3::new(x[0], x[1], x[2]) * spread, Vec3::splat(0.05 * x[3] * x[3]))
-        };
-        let boxes: Vec<(Vec3, Vec3)> = (0..n).map(|i| place(i, 0, 1.0)).collect();
-        let tree = OverlapTree::new(&boxes);
-        let mut near = Near::default();
-        for group in 0..40 {
-            let spread = [0.02, 0.2, 1.0][group as usize % 3];
-            let own = |i: u64| {
-                let (center, half) = place(group * 8 + i, 1, spread);
-                (place(group, 2, 1.0 - spread).0 + center, half)
-            };
-            near.clear();
-            tree.gather_near((0..7).map(own), &mut near);
-            crowded += u32::from(near.is_crowded);
-            for (center, half) in (0..8).map(own) {
-                let (mut together, mut alone) = (Vec::new(), Vec::new());
-                tree.in_box_near(&near, center, half, |entry| together.push(entry));
-                tree.in_box(center, half, |entry| alone.push(entry));
-                assert_eq!(together, alone, "{n} boxes, group {group}");
-            }
-        }
-    }
-    assert!(crowded > 10);
-}
-
 /// Sizes that no photon has are packed as well, and found.
 #[test]
 fn boxes_without_size_or_with_all_of_it_are_found() {
     let halves = [0.0, f32::MIN_POSITIVE, 1e-30, 1.0, 1e30];
     let boxes: Vec<(Vec3, Vec3)> = (0..50).map(|i| (Vec3::ONE, Vec3::splat(halves[i % 5]))).collect();
     let mut found = 0;
-    OverlapTree::new(&boxes).at_point(Vec3::ONE, |_| found += 1);
+    OverlapTree::new(&boxes).in_box(Vec3::ONE, Vec3::ZERO, |_| found += 1);
     assert_eq!(found, 50);
 }

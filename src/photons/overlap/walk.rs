@@ -7,13 +7,11 @@ use pulp::{Simd, WithSimd};
 /// Levels of a tree over 2³¹ entries, and one.
 pub(super) const DEEPEST: usize = 12;
 
-/// Looks for the blocks of a level that meet a box, or for the entries.
+/// Looks for the entries whose boxes meet a box.
 pub(super) struct Walk<'a, F> {
     pub tree: &'a OverlapTree,
     pub low: Vec3,
     pub high: Vec3,
-    /// The level whose boxes are reported by their index: 0 for that of the entries, 1 for that of their blocks.
-    pub bottom: usize,
     /// Told of each; whether to go on.
     pub visit: F,
 }
@@ -23,16 +21,11 @@ impl<F: FnMut(u32) -> bool> WithSimd for Walk<'_, F> {
 
     #[inline(always)]
     fn with_simd<I: Simd>(self, _: I) {
-        let Self { tree, low, high, bottom, mut visit } = self;
+        let Self { tree, low, high, mut visit } = self;
         // On the way down: the block of each level, and which of its eight are still to be looked at.
         let mut blocks = [0u32; DEEPEST];
         let mut masks = [0u32; DEEPEST];
         let top = tree.levels.len() - 1;
-        if top < bottom {
-            // The one block that there is.
-            visit(0);
-            return;
-        }
         let mut level = top;
         masks[top] = met(&tree.blocks[tree.levels[top] as usize], low, high);
         loop {
@@ -45,7 +38,7 @@ impl<F: FnMut(u32) -> bool> WithSimd for Walk<'_, F> {
             }
             let below = blocks[level] * LANES as u32 + masks[level].trailing_zeros();
             masks[level] &= masks[level] - 1;
-            if level == bottom {
+            if level == 0 {
                 if !visit(below) {
                     return;
                 }
@@ -53,31 +46,6 @@ impl<F: FnMut(u32) -> bool> WithSimd for Walk<'_, F> {
                 level -= 1;
                 blocks[level] = below;
                 masks[level] = met(&tree.blocks[(tree.levels[level] + below) as usize], low, high);
-            }
-        }
-    }
-}
-
-/// Looks for the entries of some blocks that meet a box.
-pub(super) struct Scan<'a, F> {
-    pub tree: &'a OverlapTree,
-    pub among: &'a [u32],
-    pub low: Vec3,
-    pub high: Vec3,
-    pub visit: F,
-}
-
-impl<F: FnMut(u32)> WithSimd for Scan<'_, F> {
-    type Output = ();
-
-    #[inline(always)]
-    fn with_simd<I: Simd>(self, _: I) {
-        let Self { tree, among, low, high, mut visit } = self;
-        for &block in among {
-            let mut mask = met(&tree.blocks[block as usize], low, high);
-            while mask != 0 {
-                visit(block * LANES as u32 + mask.trailing_zeros());
-                mask &= mask - 1;
             }
         }
     }

@@ -1,8 +1,8 @@
 //! One estimator's image as it comes in, tile by tile.
 
+use super::tiled::TiledImage;
 use crate::math::rgb::Rgb;
-use crate::render::film::{Image, Rect};
-use crate::render::tiles::TILE;
+use crate::render::film::Rect;
 
 /// What a tile of an image holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -18,7 +18,7 @@ pub enum Tile {
 /// Linear radiance with the state of its tiles. Every change counts up a version, so that whoever shows it sees what
 /// is new.
 pub struct LiveImage {
-    image: Image,
+    image: TiledImage,
     tiles: Vec<Tile>,
     versions: Vec<u64>,
     /// Thread seconds that each tile took last; 0 if unknown.
@@ -31,9 +31,10 @@ pub struct LiveImage {
 impl LiveImage {
     /// An empty image.
     pub fn new(size: [u32; 2]) -> Self {
-        let count = tile_columns(size) * size[1].div_ceil(TILE) as usize;
+        let image = TiledImage::new(size);
+        let count = image.count();
         Self {
-            image: Image::black(size),
+            image,
             tiles: vec![Tile::Empty; count],
             versions: vec![0; count],
             seconds: vec![0.0; count],
@@ -43,20 +44,25 @@ impl LiveImage {
     }
 
     /// An image that is all there.
-    pub fn whole(image: &Image) -> Self {
-        let mut live = Self::new(image.size);
-        let size = image.size;
-        live.put(Rect::whole(size), &image.pixels);
-        live
+    pub fn whole(image: TiledImage) -> Self {
+        let count = image.count();
+        Self {
+            image,
+            tiles: vec![Tile::Fresh; count],
+            versions: vec![1; count],
+            seconds: vec![0.0; count],
+            version: 1,
+            passes: 0,
+        }
     }
 
     /// Pixels across and down.
     pub fn size(&self) -> [u32; 2] {
-        self.image.size
+        self.image.size()
     }
 
-    /// The pixels; black where a tile is empty.
-    pub fn image(&self) -> &Image {
+    /// The pixels.
+    pub fn pixels(&self) -> &TiledImage {
         &self.image
     }
 
@@ -69,25 +75,16 @@ impl LiveImage {
         }
     }
 
-    /// Overwrites the pixels of `rect`, which lies inside and covers whole tiles.
-    pub fn put(&mut self, rect: Rect, pixels: &[Rgb]) {
+    /// Takes in the tile at `rect`, row by row, and its thread seconds if they are known. Nothing if it lies outside.
+    pub fn put(&mut self, rect: Rect, pixels: Vec<Rgb>, seconds: Option<f64>) {
+        let at = self.image.tile_of([rect.x, rect.y]);
+        let (Some(tile), Some(version)) = (self.tiles.get_mut(at), self.versions.get_mut(at)) else { return };
         self.image.put(rect, pixels);
         self.version += 1;
-        let columns = tile_columns(self.image.size);
-        for y in rect.y / TILE..(rect.y + rect.height).div_ceil(TILE) {
-            for x in rect.x / TILE..(rect.x + rect.width).div_ceil(TILE) {
-                let at = y as usize * columns + x as usize;
-                self.tiles[at] = Tile::Fresh;
-                self.versions[at] = self.version;
-            }
-        }
-    }
-
-    /// Notes the thread seconds of the tile at `rect`.
-    pub fn time(&mut self, rect: Rect, seconds: f64) {
-        let at = (rect.y / TILE) as usize * tile_columns(self.image.size) + (rect.x / TILE) as usize;
-        if let Some(s) = self.seconds.get_mut(at) {
-            *s = seconds;
+        *tile = Tile::Fresh;
+        *version = self.version;
+        if let Some(seconds) = seconds {
+            self.seconds[at] = seconds;
         }
     }
 
@@ -101,9 +98,9 @@ impl LiveImage {
         self.version
     }
 
-    /// The tiles with their rectangle, state and the number of their last change.
+    /// The tiles with their rectangle, state and the number of their last change, 0 for those that are empty.
     pub fn tiles(&self) -> impl Iterator<Item = (Rect, Tile, u64)> + '_ {
-        let rects = crate::render::tiles::tiles(Rect::whole(self.image.size));
+        let rects = crate::render::tiles::tiles(Rect::whole(self.size()));
         rects.into_iter().zip(&self.tiles).zip(&self.versions).map(|((rect, tile), version)| (rect, *tile, *version))
     }
 
@@ -118,32 +115,32 @@ impl LiveImage {
     }
 
     /// The pixel, if its tile has pixels.
-    pub fn at(&self, [x, y]: [u32; 2]) -> Option<Rgb> {
-        let [w, h] = self.image.size;
-        let tile = (y / TILE) as usize * tile_columns(self.image.size) + (x / TILE) as usize;
-        (x < w && y < h && self.tiles[tile] != Tile::Empty).then(|| self.image.at(x, y))
+    pub fn at(&self, pixel: [u32; 2]) -> Option<Rgb> {
+        self.image.at(pixel)
     }
-}
-
-fn tile_columns(size: [u32; 2]) -> usize {
-    size[0].div_ceil(TILE) as usize
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::render::film::Image;
 
     #[test]
     fn tiles_age_and_are_renewed() {
         let mut live = LiveImage::new([70, 40]);
         assert!(!live.has_pixels() && live.at([3, 3]).is_none());
         let rect = Rect { x: 64, y: 32, width: 6, height: 8 };
-        live.put(rect, &[Rgb::ONE; 48]);
-        assert_eq!(live.at([69, 39]), Some(Rgb::ONE));
+        live.put(rect, vec![Rgb::ONE; 48], Some(0.5));
+        assert_eq!((live.at([69, 39]), live.seconds(5)), (Some(Rgb::ONE), Some(0.5)));
         assert!(live.at([63, 39]).is_none() && live.at([70, 39]).is_none());
         live.age();
         assert_eq!(live.tiles().filter(|t| t.1 == Tile::Stale).map(|t| t.0).collect::<Vec<_>>(), [rect]);
-        live.put(Rect::whole([70, 40]), &[Rgb::ZERO; 2800]);
-        assert!(live.is_fresh() && live.tiles().all(|t| t.2 == 2));
+        for rect in crate::render::tiles::tiles(Rect::whole([70, 40])) {
+            live.put(rect, vec![Rgb::ZERO; (rect.width * rect.height) as usize], None);
+        }
+        assert!(live.is_fresh());
+        assert_eq!(live.tiles().map(|t| t.2).collect::<Vec<_>>(), [2, 3, 4, 5, 6, 7]);
+        let whole = LiveImage::whole(TiledImage::of(&Image::black([70, 40])));
+        assert!(whole.is_fresh() && whole.tiles().all(|t| t.2 == 1));
     }
 }

@@ -3,15 +3,17 @@
 pub mod image;
 pub mod shade;
 pub mod texture;
+pub mod tiled;
 pub mod values;
 
 use crate::export::false_color::ValueRange;
 use crate::export::session::Panel;
-use crate::render::film::{Image, Rect};
+use crate::render::film::Rect;
 use crate::workbench::worker::messages::{Job, TileImage};
 use image::LiveImage;
 use std::collections::BTreeMap;
 use texture::PanelTexture;
+use tiled::TiledImage;
 use values::Values;
 
 /// All images, by what they show.
@@ -46,14 +48,11 @@ impl Gallery {
     }
 
     /// Takes in a tile of all estimators that it has.
-    pub fn tile(&mut self, rect: Rect, images: &[TileImage]) {
+    pub fn tile(&mut self, rect: Rect, images: Vec<TileImage>) {
         for tile in images {
             let image = self.estimators.get(tile.estimator).and_then(|name| self.rendered.get_mut(name));
             if let Some(image) = image {
-                image.put(rect, &tile.pixels);
-                if tile.seconds.total() > 0.0 {
-                    image.time(rect, tile.seconds.total());
-                }
+                image.put(rect, tile.pixels, Some(tile.seconds.total()).filter(|s| *s > 0.0));
             }
         }
     }
@@ -68,7 +67,7 @@ impl Gallery {
     }
 
     /// Takes in an image from a file.
-    pub fn put_file(&mut self, path: &str, image: &Image) {
+    pub fn put_file(&mut self, path: &str, image: TiledImage) {
         self.files.insert(path.to_owned(), LiveImage::whole(image));
     }
 
@@ -78,7 +77,7 @@ impl Gallery {
     }
 
     /// Takes in another reference, or none.
-    pub fn set_reference(&mut self, image: Option<&Image>) {
+    pub fn set_reference(&mut self, image: Option<TiledImage>) {
         self.reference = image.map(LiveImage::whole);
         self.reference_texture = PanelTexture::default();
     }

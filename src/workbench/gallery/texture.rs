@@ -1,6 +1,5 @@
 //! Textures of panels, brought up to date a few tiles at a time.
 
-use super::image::{LiveImage, Tile};
 use crate::render::film::Rect;
 use egui::{Color32, ColorImage, TextureHandle, TextureOptions};
 
@@ -19,19 +18,23 @@ pub struct PanelTexture {
 }
 
 impl PanelTexture {
-    /// Brings the texture up to date: tiles that are newer, or all if `key` differs from last time. `color` gives the
-    /// colour of a pixel. Stops when `enough` says so; returns whether more is to be done.
+    /// Brings the texture of an image of `size` pixels up to date: tiles that are newer, or all if `key` differs from
+    /// last time. Stops when `enough` says so; returns whether more is to be done.
+    ///
+    /// * `tiles`: all of them, row by row, with the number of their last change; 0 where there are no pixels.
+    /// * `colors`: adds the colours of a rectangle of whole tiles, row by row.
     pub fn update(
         &mut self,
         context: &egui::Context,
-        image: &LiveImage,
+        size: [u32; 2],
         key: u64,
-        color: impl Fn(u32, u32) -> Color32,
+        tiles: impl Iterator<Item = (Rect, u64)>,
+        colors: impl Fn(Rect, &mut Vec<Color32>),
         mut enough: impl FnMut() -> bool,
     ) -> bool {
-        if self.size != image.size() || self.handle.is_none() {
-            self.size = image.size();
-            let blank = ColorImage::filled(self.size.map(|n| n as usize), super::super::theme::EMPTY);
+        if self.size != size || self.handle.is_none() {
+            self.size = size;
+            let blank = ColorImage::filled(size.map(|n| n as usize), super::super::theme::EMPTY);
             self.handle = Some(context.load_texture("panel", blank, OPTIONS));
             self.shown.clear();
         }
@@ -43,17 +46,15 @@ impl PanelTexture {
         let mut run: Option<Rect> = None;
         let mut upload = |rect: Rect| {
             let size = [rect.width as usize, rect.height as usize];
-            let pixels = (rect.y..rect.y + rect.height)
-                .flat_map(|y| (rect.x..rect.x + rect.width).map(move |x| (x, y)))
-                .map(|(x, y)| color(x, y))
-                .collect();
+            let mut pixels = Vec::with_capacity(size[0] * size[1]);
+            colors(rect, &mut pixels);
             handle.set_partial([rect.x as usize, rect.y as usize], ColorImage::new(size, pixels), OPTIONS);
         };
-        for (i, (rect, tile, version)) in image.tiles().enumerate() {
+        for (i, (rect, version)) in tiles.enumerate() {
             if self.shown.len() <= i {
                 self.shown.push(0);
             }
-            if tile == Tile::Empty || self.shown[i] == version {
+            if self.shown[i] == version {
                 continue;
             }
             // Neighbours in a row go up together.
@@ -76,22 +77,6 @@ impl PanelTexture {
             upload(r);
         }
         false
-    }
-
-    /// Shows one colour for each pixel of an image that is all there; drawn again if `key` differs from last time.
-    pub fn show(&mut self, context: &egui::Context, size: [u32; 2], key: u64, color: impl Fn(usize) -> Color32) {
-        if self.size == size && self.key == key && self.handle.is_some() {
-            return;
-        }
-        let [w, h] = size.map(|n| n as usize);
-        let image = ColorImage::new([w, h], (0..w * h).map(color).collect());
-        match &mut self.handle {
-            Some(handle) => handle.set(image, OPTIONS),
-            None => self.handle = Some(context.load_texture("panel", image, OPTIONS)),
-        }
-        self.size = size;
-        self.key = key;
-        self.shown.clear();
     }
 
     /// The texture, once there is one.

@@ -3,7 +3,7 @@
 use crate::export::false_color::{ColorMap, FalseColor, ValueRange};
 use crate::measure::difference::{Difference, difference, quantile_range};
 use crate::render::Pass;
-use crate::render::film::Image;
+use crate::render::film::{Image, Rect};
 use crate::render::heatmap::{Heatmap, HeatmapPass};
 use std::sync::Arc;
 
@@ -87,6 +87,13 @@ impl Values {
     /// The scale of colours over a range: `map` for values of one sign, the diverging one for others.
     pub fn scale(&self, map: ColorMap, range: ValueRange) -> FalseColor {
         FalseColor::new(if self.signed { ColorMap::Diverging } else { map }, range)
+    }
+
+    /// The rows of `rect`, which lies inside.
+    pub fn rows(&self, rect: Rect) -> impl Iterator<Item = &[f32]> {
+        let (width, start) = (self.size[0] as usize, rect.x as usize);
+        (rect.y as usize..(rect.y + rect.height) as usize)
+            .map(move |y| &self.values[y * width + start..y * width + start + rect.width as usize])
     }
 
     /// The value of a pixel.

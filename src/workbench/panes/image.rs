@@ -4,10 +4,13 @@ use super::{Panes, overlay};
 use crate::export::false_color::ValueRange;
 use crate::export::session::{Curve, Mode, Panel, Tone};
 use crate::export::tone::SrgbTable;
+use crate::render::film::Rect as PixelRect;
+use crate::render::tiles::tiles;
 use crate::workbench::actions::Action;
 use crate::workbench::desk::Hover;
 use crate::workbench::gallery::image::{LiveImage, Tile};
 use crate::workbench::gallery::shade::{Shade, color_map, luminance_scale};
+use crate::workbench::gallery::texture::PanelTexture;
 use crate::workbench::theme::{self, mono, number};
 use crate::workbench::viewport::Viewport;
 use egui::{Align2, Color32, FontId, Rect, Sense, Stroke, Ui, pos2, vec2};
@@ -218,7 +221,8 @@ fn update_texture(panes: &mut Panes, context: &egui::Context, index: usize, pane
     if panes.gallery.textures.len() <= index {
         panes.gallery.textures.resize_with(index + 1, Default::default);
     }
-    let late = panes.is_late();
+    let (late, started) = (panes.is_late(), panes.started);
+    let enough = || late || started.elapsed() > super::TEXTURE_TIME;
     let tone = &panes.document.session.tone;
     let exposure = if tone.auto { panes.desk.auto_exposure } else { tone.exposure };
     let mut texture = std::mem::take(&mut panes.gallery.textures[index]);
@@ -226,22 +230,41 @@ fn update_texture(panes: &mut Panes, context: &egui::Context, index: usize, pane
         let scale = values.scale(color_map(tone.false_color.as_deref()), values_range(panes, index));
         let made_of = Arc::as_ptr(&values.values) as usize;
         let key = hash(&format!("{made_of} {:?} {:?}", scale.range(), tone.false_color));
-        texture.show(context, values.size, key, |i| {
-            let [r, g, b] = scale.color(values.values[i]);
-            Color32::from_rgb(r, g, b)
-        });
+        let tiles = tiles(PixelRect::whole(values.size)).into_iter().map(|rect| (rect, 1));
+        let colors = |rect: PixelRect, out: &mut Vec<Color32>| {
+            out.extend(values.rows(rect).flatten().map(|x| {
+                let [r, g, b] = scale.color(*x);
+                Color32::from_rgb(r, g, b)
+            }));
+        };
+        if texture.update(context, values.size, key, tiles, colors, enough) {
+            panes.desk.unfinished = true;
+        }
     } else if let Some(image) = panes.gallery.of(panel) {
         let shade = Shade::new(tone, exposure);
         let key = key_of(panel, tone, exposure);
-        let started = panes.started;
-        let enough = || late || started.elapsed() > super::TEXTURE_TIME;
-        let color = |x: u32, y: u32| shade.color(&SRGB, image.image().at(x, y));
-        if texture.update(context, image, key, color, enough) {
+        if show_radiance(&mut texture, context, image, &shade, key, enough) {
             panes.desk.unfinished = true;
         }
     }
     panes.gallery.textures[index] = texture;
     update_reference(panes, context, exposure);
+}
+
+/// Brings a texture of radiance up to date; whether more is to be done.
+fn show_radiance(
+    texture: &mut PanelTexture,
+    context: &egui::Context,
+    image: &LiveImage,
+    shade: &Shade,
+    key: u64,
+    enough: impl FnMut() -> bool,
+) -> bool {
+    let tiles = image.tiles().map(|(rect, _, version)| (rect, version));
+    let colors = |rect, out: &mut Vec<Color32>| {
+        out.extend(image.pixels().pieces(rect).flatten().map(|p| shade.color(&SRGB, *p)));
+    };
+    texture.update(context, image.size(), key, tiles, colors, enough)
 }
 
 /// The reference's texture, where something shows it.
@@ -255,9 +278,9 @@ fn update_reference(panes: &mut Panes, context: &egui::Context, exposure: f32) {
     let key = key_of(&Panel::of("reference"), tone, exposure);
     let mut texture = std::mem::take(&mut panes.gallery.reference_texture);
     if let Some(image) = panes.gallery.reference() {
-        let color = |x: u32, y: u32| shade.color(&SRGB, image.image().at(x, y));
-        let late = panes.is_late();
-        if texture.update(context, image, key, color, || late) {
+        let (late, started) = (panes.is_late(), panes.started);
+        let enough = || late || started.elapsed() > super::TEXTURE_TIME;
+        if show_radiance(&mut texture, context, image, &shade, key, enough) {
             panes.desk.unfinished = true;
         }
     }

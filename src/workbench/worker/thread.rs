@@ -8,6 +8,7 @@ use crate::render::error_estimate::{ErrorEstimate, is_milestone};
 use crate::render::film::{Film, Rect};
 use crate::render::pass::Pass;
 use crate::render::stop::Standing;
+use crate::render::tiles::tiles;
 use crate::render::view_pass::PartSeconds;
 use crate::render::watch::{TileDone, Watch};
 use crate::render::{Renderer, Step, StoppedBy};
@@ -93,9 +94,11 @@ impl Loop<'_> {
         // What is kept may have been sent for an older generation and dropped, so it is sent again.
         for (estimator, film) in renderer.films().iter().enumerate().filter(|(_, f)| f.passes() > 0) {
             let image = film.image();
-            let images = vec![TileImage { estimator, pixels: image.pixels, seconds: PartSeconds::default() }];
-            let rect = Rect::whole(image.size);
-            desk.send(Event::TileDone { generation: job.generation, rect, images, draft: false });
+            for rect in tiles(Rect::whole(image.size)) {
+                let pixels = image.crop(rect).pixels;
+                let images = vec![TileImage { estimator, pixels, seconds: PartSeconds::default() }];
+                desk.send(Event::TileDone { generation: job.generation, rect, images, draft: false });
+            }
         }
         let kept = estimates(renderer, |_| true);
         let error = worst(&kept);
