@@ -13,7 +13,6 @@ use cusp::photons::irradiance::surface_area::SurfaceAreas;
 use cusp::photons::irradiance::{GlobalPhotons, IrradiancePyramid, PyramidSettings};
 use cusp::photons::kd_tree::Nearest;
 use cusp::photons::map::{FootprintLimits, MapParts, Query};
-use cusp::photons::near::Near;
 use cusp::photons::{PhotonKind, PhotonMap, StoredPhoton};
 use cusp::render::Silent;
 use cusp::render::film::{Film, Rect};
@@ -66,14 +65,14 @@ fn gather_and_estimate(c: &mut Criterion) {
     group.bench_function("overlap_point", |b| {
         b.iter(|| {
             found.clear();
-            views.iter().for_each(|v| map.overlapping_point(&v.query, &Near::default(), &mut found));
+            views.iter().for_each(|v| map.overlapping_point(&v.query, &mut found));
             found.len()
         });
     });
     group.bench_function("overlap_parallelogram", |b| {
         b.iter(|| {
             found.clear();
-            views.iter().for_each(|v| map.overlapping_parallelogram(&v.query, &Near::default(), &mut found));
+            views.iter().for_each(|v| map.overlapping_parallelogram(&v.query, &mut found));
             found.len()
         });
     });

@@ -6,7 +6,6 @@ use crate::estimate::registry::{ESTIMATORS, estimator};
 use crate::estimate::{Estimator, Gathered, Lookup, View};
 use crate::math::rgb::Rgb;
 use crate::photons::map::{FootprintLimits, MapParts, Query};
-use crate::photons::near::Near;
 use crate::photons::{MapPhoton, Photon, PhotonMap};
 use glam::{DVec2, Quat, Vec3};
 use proptest::prelude::*;
@@ -266,7 +265,7 @@ proptest! {
         nearest.sort_unstable();
         prop_assert_eq!(found, nearest);
         let mut overlapping = Vec::new();
-        map.overlapping_parallelogram(&query, &Near::default(), &mut overlapping);
+        map.overlapping_parallelogram(&query, &mut overlapping);
         let integrated = estimator("integrated").expect("registered");
         for i in &lit {
             let photon = &map.photons()[*i as usize];

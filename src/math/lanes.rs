@@ -1,9 +1,28 @@
 //! Numbers and vectors in as many lanes as the processor's instructions have. What is written with them rounds in each lane
 //! as it does alone: no product is fused with a sum.
+//!
+//! All of it has to end up in the one function that is compiled for these instructions, so everything is inlined, and no
+//! closures and no `map` of arrays go between: they are functions of their own, compiled for any processor.
 
 use glam::Vec3;
 use pulp::Simd;
+use std::any::Any;
 use std::ops::{Add, Div, Mul, Neg, Sub};
+
+/// A mask as bits, the first lane the lowest.
+#[inline(always)]
+pub fn bits<S: Simd>(simd: S, mask: S::m32s) -> u32 {
+    let words = simd.select_u32s(mask, simd.splat_u32s(u32::MAX), simd.splat_u32s(0));
+    #[cfg(target_arch = "x86_64")]
+    if let (Some(v3), Ok(words)) =
+        ((&simd as &dyn Any).downcast_ref::<pulp::x86::V3>(), pulp::bytemuck::try_cast(words))
+    {
+        // One instruction; which way to go is known when this is compiled.
+        return v3.avx._mm256_movemask_ps(words) as u32;
+    }
+    let words = pulp::bytemuck::cast_slice::<S::u32s, u32>(std::slice::from_ref(&words));
+    words.iter().rev().fold(0, |bits, word| bits << 1 | word & 1)
+}
 
 /// A 32-bit number in each lane.
 #[derive(Clone, Copy, Debug)]
@@ -25,16 +44,18 @@ impl<S: Simd> Lanes<S> {
         Self { simd, value: simd.splat_f32s(x) }
     }
 
-    /// Square roots.
-    #[inline(always)]
-    pub fn sqrt(self) -> Self {
-        Self { value: self.simd.sqrt_f32s(self.value), ..self }
-    }
-
     /// Magnitudes.
     #[inline(always)]
     pub fn abs(self) -> Self {
-        Self { value: self.simd.abs_f32s(self.value), ..self }
+        let sign = self.simd.splat_f32s(-0.0);
+        Self { value: self.simd.and_f32s(self.simd.not_f32s(sign), self.value), ..self }
+    }
+
+    /// Kept between -1 and 1; -1 where it is no number.
+    #[inline(always)]
+    pub fn within_one(self) -> Self {
+        let not_less = self.simd.max_f32s(self.value, self.simd.splat_f32s(-1.0));
+        Self { value: self.simd.min_f32s(not_less, self.simd.splat_f32s(1.0)), ..self }
     }
 
     /// Where it is less; nowhere next to what is no number, as below.
@@ -47,12 +68,6 @@ impl<S: Simd> Lanes<S> {
     #[inline(always)]
     pub fn at_most(self, other: Self) -> S::m32s {
         self.simd.less_than_or_equal_f32s(self.value, other.value)
-    }
-
-    /// It where the mask holds, and `other` elsewhere.
-    #[inline(always)]
-    pub fn or(self, mask: S::m32s, other: Self) -> Self {
-        Self { value: self.simd.select_f32s(mask, self.value, other.value), ..self }
     }
 }
 
@@ -92,7 +107,7 @@ impl<S: Simd> Neg for Lanes<S> {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
-        Self { value: self.simd.neg_f32s(self.value), ..self }
+        Self { value: self.simd.xor_f32s(self.simd.splat_f32s(-0.0), self.value), ..self }
     }
 }
 
@@ -111,15 +126,23 @@ impl<S: Simd> Vec3Lanes<S> {
     /// Those of a structure of arrays, as [`Lanes::of`].
     #[inline(always)]
     pub fn of<const N: usize>(simd: S, arrays: &[[f32; N]; 3], group: usize) -> Self {
-        let [x, y, z] = arrays.each_ref().map(|array| Lanes::of(simd, array, group));
-        Self { x, y, z }
+        let [x, y, z] = arrays;
+        Self { x: Lanes::of(simd, x, group), y: Lanes::of(simd, y, group), z: Lanes::of(simd, z, group) }
     }
 
     /// The same vector in each.
     #[inline(always)]
     pub fn splat(simd: S, v: Vec3) -> Self {
-        let [x, y, z] = v.to_array().map(|x| Lanes::splat(simd, x));
-        Self { x, y, z }
+        Self { x: Lanes::splat(simd, v.x), y: Lanes::splat(simd, v.y), z: Lanes::splat(simd, v.z) }
+    }
+
+    /// Where the box from these corners to `high` meets the box from `low` to `top`.
+    #[inline(always)]
+    pub fn boxes_meet(simd: S, (l, h): (Self, Self), (low, high): (Self, Self)) -> S::m32s {
+        let x = simd.and_m32s(l.x.at_most(high.x), low.x.at_most(h.x));
+        let y = simd.and_m32s(l.y.at_most(high.y), low.y.at_most(h.y));
+        let z = simd.and_m32s(l.z.at_most(high.z), low.z.at_most(h.z));
+        simd.and_m32s(simd.and_m32s(x, y), z)
     }
 
     /// Dot products, in glam's order.

@@ -1,6 +1,6 @@
 //! Whether a view footprint meets a photon's ellipsoid.
 
-use crate::math::lanes::{Lanes, Vec3Lanes};
+use crate::math::lanes::{Lanes, Vec3Lanes, bits};
 use crate::photons::MapPhoton;
 use crate::photons::map::Query;
 use glam::{DVec3, Vec3};
@@ -9,25 +9,13 @@ use pulp::Simd;
 /// What f32 may get wrong of squared lengths, of their sum.
 const UNSURE: f32 = 1e-5;
 
-/// What 32 bits tell about a parallelogram and the unit ball.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u32)]
-pub enum Verdict {
-    /// It misses the ball.
-    Misses = 0,
-    /// It meets the ball.
-    Meets = 1,
-    /// It takes more digits.
-    Unsure = 2,
-}
-
 /// Whether the query's parallelogram comes nearer than 1 to the photon in filter space.
 pub fn meets_unit_ball(p: &MapPhoton, query: &Query) -> bool {
     let [a, b] = query.axes.map(|v| p.to_filter(v));
     meets(p.to_filter(query.center - p.position), a, b)
 }
 
-/// The same where [`verdict`] is unsure.
+/// The same without the short cuts.
 pub fn exactly_meets(p: &MapPhoton, query: &Query) -> bool {
     let [a, b] = query.axes.map(|v| p.to_filter(v));
     nearest_on_parallelogram(p.to_filter(query.center - p.position), a, b) < 1.0
@@ -36,52 +24,49 @@ pub fn exactly_meets(p: &MapPhoton, query: &Query) -> bool {
 /// Whether the parallelogram about `c` with half-edges `a`, `b` comes nearer than 1 to the origin.
 #[inline]
 fn meets(c: Vec3, a: Vec3, b: Vec3) -> bool {
-    match verdict(c, a, b) {
-        Verdict::Misses => false,
-        Verdict::Meets => true,
-        Verdict::Unsure => nearest_on_parallelogram(c, a, b) < 1.0,
-    }
-}
-
-/// The same as far as f32 decides it by more than its rounding: by the plane across the way to the centre, and by a point
-/// that is near the nearest.
-#[inline]
-fn verdict(c: Vec3, a: Vec3, b: Vec3) -> Verdict {
     let cc = c.length_squared();
     if cc < 1.0 {
-        return Verdict::Meets;
+        return true;
     }
+    // In f32 what is decided by more than its rounding: by the plane across the way to the centre, and by a point that is
+    // near the nearest.
     let (aa, bb) = (a.length_squared(), b.length_squared());
-    let reach = 1.0 + aa.sqrt() + bb.sqrt();
     let (ca, cb) = (c.dot(a), c.dot(b));
     let rounding = UNSURE * (1.0 + cc + aa + bb);
-    if cc >= reach * reach || cc - ca.abs() - cb.abs() > cc.sqrt() + rounding {
-        return Verdict::Misses;
+    let gap = cc - ca.abs() - cb.abs() - rounding;
+    if gap > 0.0 && gap * gap > cc {
+        return false;
     }
     let near = c + a * (-ca / aa).clamp(-1.0, 1.0) + b * (-cb / bb).clamp(-1.0, 1.0);
-    if near.length_squared() < 1.0 - rounding { Verdict::Meets } else { Verdict::Unsure }
+    near.length_squared() < 1.0 - rounding || nearest_on_parallelogram(c, a, b) < 1.0
 }
 
-/// [`verdict`] of each lane, as its number: one may be unsure where the other is not.
+/// What f32 decides of the parallelograms in lanes, as bits.
+pub struct Reach {
+    /// Those that meet the ball.
+    pub meets: u32,
+    /// Those that may or may not: the nearest point decides.
+    pub unsure: u32,
+}
+
+/// By the same short cuts whether parallelograms come nearer than 1 to the origin, where they are `among` these.
 #[inline(always)]
-pub fn verdicts_of<S: Simd>(simd: S, c: Vec3Lanes<S>, a: Vec3Lanes<S>, b: Vec3Lanes<S>) -> S::u32s {
+pub fn reach_in_lanes<S: Simd>(simd: S, c: Vec3Lanes<S>, a: Vec3Lanes<S>, b: Vec3Lanes<S>, among: u32) -> Reach {
     let (zero, one) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, 1.0));
     let (aa, bb, cc) = (a.dot(a), b.dot(b), c.dot(c));
     let (ca, cb) = (c.dot(a), c.dot(b));
-    let reach = one + aa.sqrt() + bb.sqrt();
     let rounding = Lanes::splat(simd, UNSURE) * (one + cc + aa + bb);
-    let is_beyond = (reach * reach).at_most(cc);
-    let misses = simd.or_m32s(is_beyond, (cc.sqrt() + rounding).less(cc - ca.abs() - cb.abs()));
+    let gap = cc - ca.abs() - cb.abs() - rounding;
+    let meets = among & bits(simd, cc.less(one));
+    let misses = bits(simd, simd.and_m32s(zero.less(gap), cc.less(gap * gap)));
+    let open = among & !meets & !misses;
+    if open == 0 {
+        return Reach { meets, unsure: 0 };
+    }
     // A vector without length goes nowhere.
-    let within = |x: Lanes<S>| {
-        let x = x.or((zero - one).less(x), zero - one);
-        x.or(x.less(one), one)
-    };
-    let near = c + a * within(-ca / aa) + b * within(-cb / bb);
-    let meets = near.dot(near).less(one - rounding);
-    let [no, yes, unsure] = [Verdict::Misses, Verdict::Meets, Verdict::Unsure].map(|v| simd.splat_u32s(v as u32));
-    let outside = simd.select_u32s(misses, no, simd.select_u32s(meets, yes, unsure));
-    simd.select_u32s(cc.less(one), yes, outside)
+    let near = c + a * (-ca / aa).within_one() + b * (-cb / bb).within_one();
+    let met = open & bits(simd, near.dot(near).less(one - rounding));
+    Reach { meets: meets | met, unsure: open & !met }
 }
 
 /// Squared distance of the parallelogram `c + s a + t b`, `|s|, |t| ≤ 1`, from the origin.
@@ -108,12 +93,26 @@ fn nearest_on_parallelogram(c: Vec3, a: Vec3, b: Vec3) -> f32 {
 mod tests {
     use super::*;
     use crate::math::sequence::{Sampling, Sequence};
+    use pulp::{Arch, WithSimd};
+
+    /// One parallelogram in all lanes, and how many there are.
+    struct InLanes([Vec3; 3]);
+
+    impl WithSimd for InLanes {
+        type Output = (Reach, u32);
+
+        fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
+            let [c, a, b] = self.0.map(|v| Vec3Lanes::splat(simd, v));
+            let lanes = S::F32_LANES as u32;
+            (reach_in_lanes(simd, c, a, b, u32::MAX >> (32 - lanes)), lanes)
+        }
+    }
 
     /// What is decided in f32 is what the nearest point decides in f64, for large and small footprints of both.
     #[test]
     fn short_cuts_decide_as_the_nearest_point_does() {
         let sequence = Sequence::new(Sampling::Random, 10);
-        let (mut met, mut missed) = (0, 0);
+        let (mut met, mut missed, mut unsure) = (0, 0, 0);
         for i in 0..300_000u64 {
             let vector = |set| Vec3::from_slice(&sequence.four(i, set)[..3]) * 2.0 - 1.0;
             let sizes = sequence.four(i, 3).map(|x| (8.0 * x - 6.0).exp());
@@ -130,10 +129,15 @@ mod tests {
             }
             let exact = nearest < 1.0;
             assert_eq!(meets(c, a, b), exact, "{c} {a} {b}");
+            let reach = Arch::new().dispatch(InLanes([c, a, b]));
+            let all = u32::MAX >> (32 - reach.1);
+            assert!([0, all].contains(&reach.0.meets) && [0, all].contains(&reach.0.unsure));
+            assert!(reach.0.unsure != 0 || (reach.0.meets != 0) == exact, "{c} {a} {b}");
+            unsure += u32::from(reach.0.unsure != 0);
             let near = c.length() < 1.0 + a.length() + b.length() && c.length() > 1.0;
             met += u32::from(near && exact);
             missed += u32::from(near && !exact);
         }
-        assert!(met > 10_000 && missed > 10_000, "{met} {missed}");
+        assert!(met > 10_000 && missed > 10_000 && unsure < 100_000, "{met} {missed} {unsure}");
     }
 }

@@ -5,9 +5,9 @@ use crate::photons::Photon;
 use crate::photons::ellipsoid::meets_unit_ball;
 use crate::photons::footprint::FilterTransform;
 use crate::photons::kd_tree::{self, KdTree, Nearest, NearestQuery};
-use crate::photons::near::Near;
 use crate::photons::overlap::{self, Block, LANES, OverlapTree, packing_order};
 use crate::photons::photon::Footprinted;
+use crate::photons::together::Together;
 use glam::{DVec2, Vec2, Vec3};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -268,24 +268,26 @@ impl PhotonMap {
         tree.nearest(&nearest, heap, |i| self.photons[i as usize].lights(query.normal));
     }
 
-    /// Finds what queries near each other have in common, if `near` is not for the first of them already: with it, the
-    /// methods below are faster. What they find is the same.
-    pub fn gather_near(&self, queries: impl Iterator<Item = Query>, near: &mut Near) {
-        if let Some(tree) = &self.overlap
-            && let Some((low, high)) = near.starts(queries.map(bounds))
-        {
-            tree.while_between(low, high, |i| near.push(i, &self.photons[i as usize], tree.corners_of(i)));
+    /// Does several of the look-ups below at once, for points: neighbours, numbered from `first`. They find the same.
+    pub fn points_together(&self, first: usize, queries: impl Iterator<Item = Query>, together: &mut Together) {
+        if let Some(tree) = &self.overlap {
+            let points = queries.map(|query| (query, (query.center, Vec3::ZERO)));
+            together.find::<true>(&self.photons, tree, first, points);
         }
     }
 
-    /// Appends to `out` exactly the photons whose ellipsoid meets the query's point.
+    /// The same for parallelograms.
+    pub fn parallelograms_together(&self, first: usize, queries: impl Iterator<Item = Query>, together: &mut Together) {
+        if let Some(tree) = &self.overlap {
+            together.find::<false>(&self.photons, tree, first, queries.map(|query| (query, bounds(query))));
+        }
+    }
+
+    /// Appends to `out` exactly the photons whose ellipsoid meets the query's point, in the map's order.
     ///
     /// Nothing is found in a map without footprint hierarchy.
-    pub fn overlapping_point(&self, query: &Query, near: &Near, out: &mut Vec<u32>) {
+    pub fn overlapping_point(&self, query: &Query, out: &mut Vec<u32>) {
         let Some(tree) = &self.overlap else { return };
-        if near.find::<true>(query, (query.center, Vec3::ZERO), out) {
-            return;
-        }
         tree.in_box(query.center, Vec3::ZERO, |i| {
             let p = &self.photons[i as usize];
             if p.to_filter(query.center - p.position).length_squared() < 1.0 && p.lights(query.normal) {
@@ -294,15 +296,12 @@ impl PhotonMap {
         });
     }
 
-    /// Appends to `out` exactly the photons whose ellipsoid meets the query's parallelogram.
+    /// Appends to `out` exactly the photons whose ellipsoid meets the query's parallelogram, in the map's order.
     ///
     /// Nothing is found in a map without footprint hierarchy.
-    pub fn overlapping_parallelogram(&self, query: &Query, near: &Near, out: &mut Vec<u32>) {
+    pub fn overlapping_parallelogram(&self, query: &Query, out: &mut Vec<u32>) {
         let Some(tree) = &self.overlap else { return };
         let (center, half) = bounds(*query);
-        if near.find::<false>(query, (center, half), out) {
-            return;
-        }
         tree.in_box(center, half, |i| {
             let p = &self.photons[i as usize];
             if p.lights(query.normal) && meets_unit_ball(p, query) {
@@ -372,9 +371,9 @@ mod tests {
                 let q = if point { Query { axes: [Vec3::ZERO; 2], ..q } } else { q };
                 found.clear();
                 if point {
-                    map.overlapping_point(&q, &Near::default(), &mut found);
+                    map.overlapping_point(&q, &mut found);
                 } else {
-                    map.overlapping_parallelogram(&q, &Near::default(), &mut found);
+                    map.overlapping_parallelogram(&q, &mut found);
                 }
                 found.sort_unstable();
                 // A fine grid over the parallelogram in f64, away from the boundary by the grid's own spacing.
@@ -429,7 +428,7 @@ mod tests {
         for q in queries(200) {
             let (mut by_k, mut by_overlap) = (Vec::new(), Vec::new());
             map.nearest(&q, 10_000, &mut heap, &mut by_k);
-            map.overlapping_parallelogram(&q, &Near::default(), &mut by_overlap);
+            map.overlapping_parallelogram(&q, &mut by_overlap);
             by_k.sort_unstable();
             for i in by_overlap {
                 assert!(by_k.binary_search(&i).is_ok());
@@ -469,8 +468,8 @@ mod tests {
             for q in queries(20) {
                 let mut out = Vec::new();
                 map.nearest(&q, 5, &mut heap, &mut out);
-                map.overlapping_point(&q, &Near::default(), &mut out);
-                map.overlapping_parallelogram(&q, &Near::default(), &mut out);
+                map.overlapping_point(&q, &mut out);
+                map.overlapping_parallelogram(&q, &mut out);
                 assert!(out.iter().all(|&i| u64::from(i) < n));
             }
         }

@@ -6,12 +6,12 @@ pub mod footprint;
 pub mod irradiance;
 pub mod kd_tree;
 pub mod map;
-pub mod near;
 pub mod overlap;
 pub mod path;
 pub mod photon;
 pub mod projection;
 pub mod spread;
+pub mod together;
 
 pub use map::{MapPhoton, PhotonMap};
 pub use photon::{Photon, PhotonKind, StoredPhoton, StoredPhotons};

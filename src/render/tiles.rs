@@ -26,9 +26,29 @@ pub fn tiles_of(region: Rect, side: u32) -> Vec<Rect> {
     all
 }
 
+/// Pixels of a rectangle, which are numbered row by row, in blocks of four by two: those that follow each other lie together.
+pub fn in_blocks(width: u32, height: u32) -> impl Iterator<Item = usize> {
+    let block = move |x: u32, y: u32| {
+        let rows = y..(y + 2).min(height);
+        rows.flat_map(move |row| (x..(x + 4).min(width)).map(move |column| (row * width + column) as usize))
+    };
+    let corners = (0..height).step_by(2).flat_map(move |y| (0..width).step_by(4).map(move |x| (x, y)));
+    corners.flat_map(move |(x, y)| block(x, y))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn blocks_hold_each_pixel_once() {
+        assert_eq!(in_blocks(5, 3).collect::<Vec<_>>(), [0, 1, 2, 3, 5, 6, 7, 8, 4, 9, 10, 11, 12, 13, 14]);
+        for (width, height) in [(32, 32), (1, 1), (7, 9), (0, 3)] {
+            let mut all: Vec<usize> = in_blocks(width, height).collect();
+            all.sort_unstable();
+            assert!(all.into_iter().eq(0..(width * height) as usize));
+        }
+    }
 
     #[test]
     fn tiles_cover_each_pixel_once() {

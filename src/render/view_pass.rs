@@ -8,7 +8,7 @@ use crate::math::hash::mix;
 use crate::math::rgb::{Rgb, in_f32};
 use crate::math::sequence::{Sampling, Sequence};
 use crate::photons::kd_tree::Nearest;
-use crate::photons::near::Near;
+use crate::photons::together::{TOGETHER, Together};
 use crate::photons::{PhotonKind, PhotonMap};
 use crate::render::cells::{cells_of_pass, parts_of_pass};
 use crate::render::film::{Image, Rect};
@@ -16,7 +16,7 @@ use crate::render::flat_pixels::FlatPixels;
 use crate::render::photon_pass::PhotonMaps;
 use crate::render::plan::Slot;
 use crate::render::settings::Gather;
-use crate::render::tiles::tiles_of;
+use crate::render::tiles::{in_blocks, tiles_of};
 use crate::render::view::{
     Branch, Unrecorded, ViewCounts, ViewHit, ViewRecorder, ViewTracer, at_point, sample_position,
 };
@@ -171,9 +171,6 @@ pub trait TileWatch: Sync {
 /// Photons that are gathered before they are estimated; a hit's own may exceed it.
 const BATCH: usize = 1 << 20;
 
-/// Hits in a row that look photons up together: neighbours see nearly the same ones.
-const NEAR: usize = 8;
-
 /// Buffers that a thread keeps from tile to tile.
 #[derive(Default)]
 pub(super) struct Scratch {
@@ -187,8 +184,8 @@ pub(super) struct Scratch {
     nearest: [Nearest; PhotonKind::ALL.len()],
     /// Of each hit of a batch, from all maps.
     irradiances: Vec<DVec3>,
-    /// What the next hits have in common in each map.
-    near: [Near; PhotonKind::ALL.len()],
+    /// What hits in a row have found in each map: neighbours see nearly the same photons.
+    together: [Together; PhotonKind::ALL.len()],
     gather: GatherScratch,
 }
 
@@ -300,8 +297,7 @@ impl ViewPass<'_> {
         let half = 0.5 / (n as f32 * cells);
         let mut base = vec![DVec3::ZERO; (rect.width * rect.height) as usize];
         scratch.hits.clear();
-        scratch.near.iter_mut().for_each(Near::clear);
-        for (pixel, sum) in base.iter_mut().enumerate() {
+        for pixel in in_blocks(rect.width, rect.height) {
             let x = rect.x + pixel as u32 % rect.width;
             let y = rect.y + pixel as u32 / rect.width;
             let seed = mix(mix(t.settings.seed, 0x76_6965_7773), u64::from(y) << 32 | u64::from(x));
@@ -318,7 +314,7 @@ impl ViewPass<'_> {
                 let ray = Ray { origin: camera.position, direction };
                 recorder.ray(cell);
                 let before = scratch.hits.len();
-                *sum += t.trace(
+                base[pixel] += t.trace(
                     ray,
                     differential,
                     &sequence,
@@ -357,6 +353,7 @@ impl ViewPass<'_> {
         let mut seconds = PartSeconds::default();
         let (mut gathered, mut disc_floor) = (0, 0);
         let resolution = self.tracer.scene.resolution();
+        scratch.together.iter_mut().for_each(Together::clear);
         let mut next = 0;
         while next < scratch.hits.len() {
             let start = Instant::now();
@@ -444,6 +441,7 @@ impl ViewPass<'_> {
         self.trace(rect, rays, &mut scratch, &mut ViewCounts::default(), &mut Unrecorded);
         let view_trace = start.elapsed().as_secs_f64();
         let start = Instant::now();
+        scratch.together.iter_mut().for_each(Together::clear);
         for hit in 0..scratch.hits.len() {
             for map in self.maps.of_estimator(slot.estimator) {
                 let from = scratch.indices.len();
@@ -463,6 +461,7 @@ impl ViewPass<'_> {
         scratch: &mut Scratch,
         mut visit: impl FnMut(usize, &ViewHit, PhotonKind, &Gathered),
     ) {
+        scratch.together.iter_mut().for_each(Together::clear);
         for hit in 0..scratch.hits.len() {
             for (kind, map) in self.maps.of_estimator(slot.estimator) {
                 scratch.indices.clear();
@@ -479,14 +478,20 @@ impl ViewPass<'_> {
         let mut own = scratch.hits[hit].view;
         let query = scratch.hits[hit].seen(slot.estimator, &mut own).query;
         let (indices, nearest) = (&mut scratch.indices, &mut scratch.nearest[kind as usize]);
-        let near = &mut scratch.near[kind as usize];
         if slot.gather == Gather::Overlap {
-            let next = scratch.hits[hit..].iter().take(NEAR);
-            let seen = next.map(|hit| hit.seen_by(slot.estimator).query);
-            match slot.estimator.lookup() {
-                Lookup::Point => map.gather_near(seen.map(|query| at_point(&query)), near),
-                Lookup::Parallelogram => map.gather_near(seen, near),
-                Lookup::Disc => {}
+            let together = &mut scratch.together[kind as usize];
+            if !together.holds(hit) {
+                let next = scratch.hits[hit..].iter().take(TOGETHER);
+                let seen = next.map(|hit| hit.seen_by(slot.estimator).query);
+                match slot.estimator.lookup() {
+                    Lookup::Point => map.points_together(hit, seen.map(|query| at_point(&query)), together),
+                    Lookup::Parallelogram => map.parallelograms_together(hit, seen, together),
+                    Lookup::Disc => {}
+                }
+            }
+            if let Some(found) = together.of(hit) {
+                indices.extend_from_slice(found);
+                return 0.0;
             }
         }
         let k = self.tracer.settings.k;
@@ -498,8 +503,8 @@ impl ViewPass<'_> {
                 let radius = (f32::from_bits(bits) * self.area_factor).sqrt();
                 return radius.max(self.tracer.scene.resolution());
             }
-            (Lookup::Point, Gather::Overlap) => map.overlapping_point(&query, near, indices),
-            (Lookup::Parallelogram, Gather::Overlap) => map.overlapping_parallelogram(&query, near, indices),
+            (Lookup::Point, Gather::Overlap) => map.overlapping_point(&query, indices),
+            (Lookup::Parallelogram, Gather::Overlap) => map.overlapping_parallelogram(&query, indices),
             (Lookup::Point, Gather::Knn) => map.nearest(&at_point(&query), k, nearest, indices),
             (Lookup::Parallelogram, Gather::Knn) => map.nearest(&query, k, nearest, indices),
         }

@@ -7,7 +7,6 @@ use crate::estimate::Gathered;
 use crate::math::rgb::Rgb;
 use crate::photons::kd_tree::Nearest;
 use crate::photons::map::{FootprintLimits, MapParts, Query};
-use crate::photons::near::Near;
 use crate::photons::{Photon, PhotonMap};
 use crate::render::film::Rect;
 use crate::render::plan::Slot;
@@ -157,7 +156,7 @@ fn crowded_maps() -> Outcome {
                     out.see(error, || format!("crowd {kind}, k {k}, query {q}: {here:e} for {there:e}"));
                 }
                 let mut found = Vec::new();
-                map.overlapping_point(&Query { axes: [Vec3::ZERO; 2], ..query }, &Near::default(), &mut found);
+                map.overlapping_point(&Query { axes: [Vec3::ZERO; 2], ..query }, &mut found);
                 let inside = |p: &crate::photons::MapPhoton| -> f64 {
                     let x = (center - p.position).as_dvec3();
                     [p.rows[0], p.rows[1], p.normal * p.inverse_reach].map(|r| r.as_dvec3().dot(x).powi(2)).iter().sum()

@@ -12,7 +12,8 @@ pub(super) use curve::packing_order;
 use glam::Vec3;
 use pulp::Arch;
 use rayon::prelude::*;
-use walk::{DEEPEST, Walk};
+use walk::{DEEPEST, Each};
+pub(super) use walk::{Visit, Walk};
 
 /// Boxes that are tested at once.
 pub(super) const LANES: usize = 8;
@@ -111,30 +112,24 @@ impl OverlapTree {
         &self.order
     }
 
-    /// Calls `visit` with the entries whose box meets the box of that centre and half-size, in their order.
-    #[inline]
-    pub fn in_box(&self, center: Vec3, half: Vec3, mut visit: impl FnMut(u32)) {
-        let (low, high) = corners((center, half));
-        self.while_between(low, high, |entry| {
-            visit(entry);
-            true
-        });
+    /// Whether it has no entries.
+    pub fn is_empty(&self) -> bool {
+        self.levels.is_empty()
     }
 
-    /// The same for a box by its corners, as long as `visit` wants more.
+    /// Calls `visit` with the entries whose box meets the box of that centre and half-size, in their order.
     #[inline]
-    pub(super) fn while_between(&self, low: Vec3, high: Vec3, visit: impl FnMut(u32) -> bool) {
-        if !self.levels.is_empty() {
-            Arch::new().dispatch(Walk { tree: self, low, high, visit });
-        }
+    pub fn in_box(&self, center: Vec3, half: Vec3, visit: impl FnMut(u32)) {
+        let (low, high) = corners((center, half));
+        Arch::new().dispatch(Walk { tree: self, low, high, visit: Each(visit) });
     }
 
     /// Corners of an entry's box, as it is tested.
-    #[inline]
+    #[inline(always)]
     pub(super) fn corners_of(&self, entry: u32) -> (Vec3, Vec3) {
         let (block, lane) = (&self.blocks[entry as usize / LANES], entry as usize % LANES);
-        let of = |x: &[[f32; LANES]; 3]| Vec3::from_array(x.each_ref().map(|x| x[lane]));
-        (of(&block.low), of(&block.high))
+        let ([lx, ly, lz], [hx, hy, hz]) = (&block.low, &block.high);
+        (Vec3::new(lx[lane], ly[lane], lz[lane]), Vec3::new(hx[lane], hy[lane], hz[lane]))
     }
 }
 

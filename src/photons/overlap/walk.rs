@@ -1,33 +1,53 @@
 //! The way through the tree, compiled for each set of instructions.
 
 use super::{Block, LANES, OverlapTree};
+use crate::math::lanes::{Vec3Lanes, bits};
 use glam::Vec3;
 use pulp::{Simd, WithSimd};
 
 /// Levels of a tree over 2³¹ entries, and one.
 pub(super) const DEEPEST: usize = 12;
 
+/// Is told what was found.
+pub trait Visit {
+    /// Of an entry, by the same instructions as it was found; whether to go on.
+    fn visit<S: Simd>(&mut self, simd: S, entry: u32) -> bool;
+}
+
+/// Of each entry.
+pub(super) struct Each<F>(pub F);
+
+impl<F: FnMut(u32)> Visit for Each<F> {
+    #[inline(always)]
+    fn visit<S: Simd>(&mut self, _: S, entry: u32) -> bool {
+        self.0(entry);
+        true
+    }
+}
+
 /// Looks for the entries whose boxes meet a box.
-pub(super) struct Walk<'a, F> {
+pub struct Walk<'a, V> {
     pub tree: &'a OverlapTree,
     pub low: Vec3,
     pub high: Vec3,
-    /// Told of each; whether to go on.
-    pub visit: F,
+    pub visit: V,
 }
 
-impl<F: FnMut(u32) -> bool> WithSimd for Walk<'_, F> {
+impl<V: Visit> WithSimd for Walk<'_, V> {
     type Output = ();
 
     #[inline(always)]
-    fn with_simd<I: Simd>(self, _: I) {
+    fn with_simd<S: Simd>(self, simd: S) {
         let Self { tree, low, high, mut visit } = self;
+        if tree.is_empty() {
+            return;
+        }
         // On the way down: the block of each level, and which of its eight are still to be looked at.
         let mut blocks = [0u32; DEEPEST];
         let mut masks = [0u32; DEEPEST];
         let top = tree.levels.len() - 1;
         let mut level = top;
-        masks[top] = met(&tree.blocks[tree.levels[top] as usize], low, high);
+        masks[top] = met(simd, &tree.blocks[tree.levels[top] as usize], low, high);
         loop {
             if masks[level] == 0 {
                 if level == top {
@@ -39,13 +59,13 @@ impl<F: FnMut(u32) -> bool> WithSimd for Walk<'_, F> {
             let below = blocks[level] * LANES as u32 + masks[level].trailing_zeros();
             masks[level] &= masks[level] - 1;
             if level == 0 {
-                if !visit(below) {
+                if !visit.visit(simd, below) {
                     return;
                 }
             } else {
                 level -= 1;
                 blocks[level] = below;
-                masks[level] = met(&tree.blocks[(tree.levels[level] + below) as usize], low, high);
+                masks[level] = met(simd, &tree.blocks[(tree.levels[level] + below) as usize], low, high);
             }
         }
     }
@@ -53,16 +73,12 @@ impl<F: FnMut(u32) -> bool> WithSimd for Walk<'_, F> {
 
 /// Which of eight boxes meet the box, as bits.
 #[inline(always)]
-fn met(block: &Block, low: Vec3, high: Vec3) -> u32 {
-    let mut bits = [0u32; LANES];
-    for (lane, bit) in bits.iter_mut().enumerate() {
-        let is_met = (block.low[0][lane] <= high.x)
-            & (block.low[1][lane] <= high.y)
-            & (block.low[2][lane] <= high.z)
-            & (block.high[0][lane] >= low.x)
-            & (block.high[1][lane] >= low.y)
-            & (block.high[2][lane] >= low.z);
-        *bit = if is_met { 1 << lane } else { 0 };
+fn met<S: Simd>(simd: S, block: &Block, low: Vec3, high: Vec3) -> u32 {
+    let mut all = 0;
+    for group in 0..LANES / S::F32_LANES {
+        let own = (Vec3Lanes::of(simd, &block.low, group), Vec3Lanes::of(simd, &block.high, group));
+        let other = (Vec3Lanes::splat(simd, low), Vec3Lanes::splat(simd, high));
+        all |= bits(simd, Vec3Lanes::boxes_meet(simd, own, other)) << (group * S::F32_LANES);
     }
-    bits.iter().fold(0, |all, own| all | own)
+    all
 }
