@@ -79,7 +79,8 @@ impl Parallelograms {
     /// Centre and half-edges of one.
     #[inline(always)]
     pub fn at(&self, i: usize) -> [Vec3; 3] {
-        self.corners.each_ref().map(|of| Vec3::from_array(of.each_ref().map(|x| x[i])))
+        let [[cx, cy, cz], [ax, ay, az], [bx, by, bz]] = &self.corners;
+        [Vec3::new(cx[i], cy[i], cz[i]), Vec3::new(ax[i], ay[i], az[i]), Vec3::new(bx[i], by[i], bz[i])]
     }
 
     /// Those of [`LANES`], by coordinate; `first` is a multiple of that.
@@ -94,7 +95,7 @@ impl Parallelograms {
 #[inline(always)]
 pub(super) fn in_filter_space(photon: &MapPhoton, view: &View) -> [Vec3; 3] {
     let [a, b] = view.query.axes;
-    [view.query.center - photon.position, a, b].map(|v| photon.to_filter(v))
+    [photon.to_filter(view.query.center - photon.position), photon.to_filter(a), photon.to_filter(b)]
 }
 
 /// Whether the view footprint is farther from the photon's ball than rounding may tell, so that the photon has no weight:

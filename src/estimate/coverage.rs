@@ -2,7 +2,8 @@
 //!
 //! A loop around the view footprint whose points are moved to the nearest of the photon's square `[-1, 1]²` winds around
 //! the same part of the square as before. So area and first moments of what both have in common are sums over four
-//! edges (Green's theorem), without a branch and without a list of vertices: many pairs are computed at once in lanes.
+//! edges (Green's theorem), without a branch and without a list of vertices: many pairs are computed at once in lanes, as
+//! long as nothing on the way is a closure or a `map` of an array, which may stay functions of their own.
 //! Every term is a continuous function of the vertices, so that edges that touch or coincide need no case of their own.
 
 use super::View;
@@ -58,12 +59,24 @@ impl Pair {
     // In f64: along a grazing ray the projection divides by next to nothing.
     #[inline(always)]
     fn seen(&self) -> Seen {
-        let along = |v: DVec3| (DVec2::new(self.rows[0].dot(v), self.rows[1].dot(v)), self.normal.dot(v));
-        let (ray, across) = along(self.direction);
+        let (ray, across) = self.along(self.direction);
         let slope = ray * (1.0 / across);
-        let filter = self.corners.map(along);
-        let own = filter.map(|(flat, height)| self.turn.rotate(flat - slope * height));
+        let [c, a, b] = self.corners;
+        let filter = [self.along(c), self.along(a), self.along(b)];
+        let own = [self.own(filter[0], slope), self.own(filter[1], slope), self.own(filter[2], slope)];
         Seen { filter, own, meets: across.abs() >= EDGE_ON }
+    }
+
+    /// A vector in the photon's filter space, its third coordinate along the normal in metres.
+    #[inline(always)]
+    fn along(&self, v: DVec3) -> (DVec2, f64) {
+        (DVec2::new(self.rows[0].dot(v), self.rows[1].dot(v)), self.normal.dot(v))
+    }
+
+    /// The same moved into the photon's plane, in its footprint.
+    #[inline(always)]
+    fn own(&self, (flat, height): (DVec2, f64), slope: DVec2) -> DVec2 {
+        self.turn.rotate(flat - slope * height)
     }
 
     /// Centre and half-edges of the view footprint in the photon's footprint, along the view ray; None if it is far off.
@@ -165,14 +178,15 @@ impl Moments {
     #[inline(always)]
     fn add(self, window: &Window, m: DVec2, e: DVec2, per_e: DVec2) -> Self {
         let Window { low, high } = window;
-        let x = |u: f64| within(m.x + e.x * u, low.x, high.x);
-        let y = |u: f64| within(m.y + e.y * u, low.y, high.y);
         // The heights change between these, and on the way there from `enters` to `leaves` the widths do.
         let (from, to) = between((low.y - m.y) * per_e.y, (high.y - m.y) * per_e.y, -1.0, 1.0);
         let (enters, leaves) = between((low.x - m.x) * per_e.x, (high.x - m.x) * per_e.x, from, to);
-        let (x0, x1) = (x(enters), x(leaves));
-        let (y0, y1) = (y(enters), y(leaves));
-        let (first, last) = (y(from), y(to));
+        let x0 = within(m.x + e.x * enters, low.x, high.x);
+        let x1 = within(m.x + e.x * leaves, low.x, high.x);
+        let y0 = within(m.y + e.y * enters, low.y, high.y);
+        let y1 = within(m.y + e.y * leaves, low.y, high.y);
+        let first = within(m.y + e.y * from, low.y, high.y);
+        let last = within(m.y + e.y * to, low.y, high.y);
         let (before, along, after) = (y0 - first, y1 - y0, last - y1);
         let area = x0 * before + (x0 + x1) * (0.5 * along) + x1 * after;
         let wide = x0 * x0 * before + (x0 * x0 + x0 * x1 + x1 * x1) * (along * (1.0 / 3.0)) + x1 * x1 * after;
@@ -249,19 +263,21 @@ impl batch::Pairs for Pairs {
 impl Pairs {
     #[inline(always)]
     fn at(&self, i: usize) -> Pair {
-        let vector = |k: usize| {
-            let of = |axis: usize| self.numbers[3 * k + axis][i];
-            Vec3::new(of(0), of(1), of(2)).as_dvec3()
-        };
-        let turn = vector(3);
+        let turn = self.vector(3, i);
         Pair {
-            rows: [vector(0), vector(1)],
-            normal: vector(2),
+            rows: [self.vector(0, i), self.vector(1, i)],
+            normal: self.vector(2, i),
             inverse_reach: turn.z,
             turn: turn.truncate(),
-            corners: [vector(4), vector(5), vector(6)],
-            direction: vector(7),
+            corners: [self.vector(4, i), self.vector(5, i), self.vector(6, i)],
+            direction: self.vector(7, i),
         }
+    }
+
+    #[inline(always)]
+    fn vector(&self, which: usize, i: usize) -> DVec3 {
+        let [x, y, z] = [3 * which, 3 * which + 1, 3 * which + 2];
+        Vec3::new(self.numbers[x][i], self.numbers[y][i], self.numbers[z][i]).as_dvec3()
     }
 
     /// [`Pair::weighed`] of each, to the bit.

@@ -78,13 +78,17 @@ impl MultiSampled {
     /// Sums of `(1 - u)²` over the points of eight parallelograms; `FLAT` if they lie in the planes of their photons.
     #[inline(always)]
     fn sums<const FLAT: bool>(&self, [c, a, b]: &[[Lanes; 3]; 3]) -> [f64; LANES] {
-        let along = |from: &Lanes, to: &Lanes, s: f32| -> Lanes { std::array::from_fn(|l| from[l] + to[l] * s) };
         // Sums in f32 are kept short: what thousands of terms lose to rounding is as much as they differ by.
         let mut all = [0.0f64; LANES];
         for rows in self.offsets.chunks(ROWS) {
             let mut sums = [[0.0f32; LANES]; COLUMNS];
             for &t in rows {
-                let row = [along(&c[0], &b[0], t), along(&c[1], &b[1], t), along(&c[2], &b[2], t)];
+                let mut row = *c;
+                for axis in 0..3 {
+                    for l in 0..LANES {
+                        row[axis][l] = c[axis][l] + b[axis][l] * t;
+                    }
+                }
                 for (offsets, weights) in &self.columns {
                     for ((sum, &s), &weight) in sums.iter_mut().zip(offsets).zip(weights) {
                         for l in 0..LANES {
@@ -102,8 +106,9 @@ impl MultiSampled {
                 }
             }
             for (l, all) in all.iter_mut().enumerate() {
-                let pair = |i: usize| sums[i][l] + sums[i + 4][l];
-                *all += f64::from((pair(0) + pair(2)) + (pair(1) + pair(3)));
+                let even = (sums[0][l] + sums[4][l]) + (sums[2][l] + sums[6][l]);
+                let odd = (sums[1][l] + sums[5][l]) + (sums[3][l] + sums[7][l]);
+                *all += f64::from(even + odd);
             }
         }
         all
@@ -129,7 +134,8 @@ impl WithSimd for Means<'_> {
             let flat = lanes.iter().all(|v| v[2] == [0.0; LANES]);
             let sums = if flat { self.of.sums::<true>(&lanes) } else { self.of.sums::<false>(&lanes) };
             for (i, sum) in sums.into_iter().enumerate() {
-                let [cc, aa, bb] = self.parallelograms.at(first + i).map(|v| v.length_squared());
+                let [c, a, b] = self.parallelograms.at(first + i);
+                let (cc, aa, bb) = (c.length_squared(), a.length_squared(), b.length_squared());
                 let reach = 1.0 + aa.sqrt() + bb.sqrt();
                 self.means[first + i] = if cc >= reach * reach { 0.0 } else { sum / points };
             }

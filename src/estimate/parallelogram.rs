@@ -1,7 +1,9 @@
 //! The mean of the Silverman kernel over a parallelogram in closed form.
 //!
 //! As an integral over a polygon, but for four edges that come in pairs; and without a branch, so that many parallelograms
-//! are integrated at once in lanes. Whatever a case needs is computed for all, and what does not hold is not taken.
+//! are integrated at once in lanes. Whatever a case needs is computed for all, and what does not hold is not taken. The
+//! compiler makes lanes of it only where all ends up in one function: nothing on the way is a closure or a `map` of an array,
+//! which may stay functions of their own.
 
 use crate::estimate::batch::{BATCH, Pairs, Parallelograms};
 use crate::estimate::polygon::{GAUSS, SHORT, THIN};
@@ -45,8 +47,8 @@ impl WithSimd for Means<'_> {
     #[inline(always)]
     fn with_simd<I: Simd>(self, _: I) {
         for (i, m) in self.means.iter_mut().enumerate().take(self.of.in_whole_lanes()) {
-            let [c, a, b] = self.of.at(i).map(|v| v.as_dvec3());
-            *m = mean(c, a, b);
+            let [c, a, b] = self.of.at(i);
+            *m = mean(c.as_dvec3(), a.as_dvec3(), b.as_dvec3());
         }
     }
 }
@@ -194,42 +196,65 @@ impl Frame {
     #[inline(always)]
     fn integral(&self, cc: f64, rho2: f64) -> f64 {
         let Self { aa, bb, ab, ca, cb, area, cxa, cxb } = *self;
-        let crosses = [cxa + area, cxb + area, area - cxa, area - cxb];
-        let clear = |cross: f64, ee: f64| cross * cross >= rho2 * ee;
-        let clear = [clear(crosses[0], aa), clear(crosses[1], bb), clear(crosses[2], aa), clear(crosses[3], bb)];
-        let beyond = |k: usize| clear[k] & (crosses[k] < 0.0);
-        let is_apart = beyond(0) | beyond(1) | beyond(2) | beyond(3);
-        let is_whole = clear[0] & clear[1] & clear[2] & clear[3];
+        let [k, l, m, n] = [cxa + area, cxb + area, area - cxa, area - cxb];
+        let (clear_k, clear_l) = (k * k >= rho2 * aa, l * l >= rho2 * bb);
+        let (clear_m, clear_n) = (m * m >= rho2 * aa, n * n >= rho2 * bb);
+        let is_apart = clear_k & (k < 0.0) | clear_l & (l < 0.0) | clear_m & (m < 0.0) | clear_n & (n < 0.0);
+        let is_whole = clear_k & clear_l & clear_m & clear_n;
         let (per_aa, per_bb, per_rho2) = (1.0 / aa, 1.0 / bb, 1.0 / rho2);
         // Squared length of the vertices: c - a - b, c + a - b, c + a + b, c - a + b.
         let all = cc + aa + bb;
         let (sum, difference) = (2.0 * (ca + cb), 2.0 * (ca - cb));
-        let inside = [
-            all + 2.0 * ab - sum < rho2,
-            all - 2.0 * ab + difference < rho2,
-            all + 2.0 * ab + sum < rho2,
-            all - 2.0 * ab - difference < rho2,
-        ];
-        let edge = |k: usize, dot: f64, (ee, per_ee): (f64, f64), p: (f64, f64), q: (f64, f64)| Edge {
-            cross: crosses[k],
-            dot,
-            ee,
-            per_ee,
-            from_inside: inside[k],
-            to_inside: inside[(k + 1) % 4],
-            point: (DVec2::from(p), DVec2::from(q)),
+        let in_0 = all + 2.0 * ab - sum < rho2;
+        let in_1 = all - 2.0 * ab + difference < rho2;
+        let in_2 = all + 2.0 * ab + sum < rho2;
+        let in_3 = all - 2.0 * ab - difference < rho2;
+        let edge_0 = Edge {
+            cross: k,
+            dot: ca - ab,
+            ee: aa,
+            per_ee: per_aa,
+            from_inside: in_0,
+            to_inside: in_1,
+            point: (DVec2::new(ca - ab, -cxa - area), DVec2::new(aa, 0.0)),
         };
-        let (a, b) = ((aa, per_aa), (bb, per_bb));
+        let edge_1 = Edge {
+            cross: l,
+            dot: cb + ab,
+            ee: bb,
+            per_ee: per_bb,
+            from_inside: in_1,
+            to_inside: in_2,
+            point: (DVec2::new(ca + aa, -cxa), DVec2::new(ab, area)),
+        };
+        let edge_2 = Edge {
+            cross: m,
+            dot: -(ca + ab),
+            ee: aa,
+            per_ee: per_aa,
+            from_inside: in_2,
+            to_inside: in_3,
+            point: (DVec2::new(ca + ab, area - cxa), DVec2::new(-aa, 0.0)),
+        };
+        let edge_3 = Edge {
+            cross: n,
+            dot: ab - cb,
+            ee: bb,
+            per_ee: per_bb,
+            from_inside: in_3,
+            to_inside: in_0,
+            point: (DVec2::new(ca - aa, -cxa), DVec2::new(-ab, -area)),
+        };
         let sum = Sum { inner: 0.0, turn: DVec2::X }
-            .add(&edge(0, ca - ab, a, (ca - ab, -cxa - area), (aa, 0.0)), rho2, per_rho2)
-            .add(&edge(1, cb + ab, b, (ca + aa, -cxa), (ab, area)), rho2, per_rho2)
-            .add(&edge(2, -(ca + ab), a, (ca + ab, area - cxa), (-aa, 0.0)), rho2, per_rho2)
-            .add(&edge(3, ab - cb, b, (ca - aa, -cxa), (-ab, -area)), rho2, per_rho2);
+            .add(&edge_0, rho2, per_rho2)
+            .add(&edge_1, rho2, per_rho2)
+            .add(&edge_2, rho2, per_rho2)
+            .add(&edge_3, rho2, per_rho2);
         let inner = sum.inner * per_rho2 * (1.0 / 6.0);
         let arcs = angle(sum.turn);
         // Either the polygon leaves out a hair of the circle, and nearly nothing of its edges lies inside; or it reaches
         // out of the disc by a hair.
-        let least = larger(larger(-crosses[0], -crosses[1]), larger(-crosses[2], -crosses[3]));
+        let least = larger(larger(-k, -l), larger(-m, -n));
         let holds = (least <= 0.0) & (inner < HAIR);
         let (short, long) = (larger(arcs, 0.0), TAU + if arcs < 0.0 { arcs } else { 0.0 });
         let hair = if holds { long } else { short };

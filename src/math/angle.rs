@@ -25,8 +25,8 @@ const ATAN: [f64; 11] = [
 /// Angle of `v` from the x axis, in [-π, π], to `10⁻¹⁵`; 0 for no vector.
 ///
 /// As `atan2(v.y, v.x)` of a library, which decides by branches that a processor cannot foresee where angles are
-/// scattered. Here octants are selected, not jumped to. Coordinates must be finite.
-#[inline]
+/// scattered. Here octants are selected, not jumped to. Coordinates must be finite. Always inlined, to be of use in lanes.
+#[inline(always)]
 pub fn angle(v: DVec2) -> f64 {
     let (x, y) = (v.x.abs(), v.y.abs());
     let (low, high) = if x < y { (x, y) } else { (y, x) };
@@ -38,10 +38,9 @@ pub fn angle(v: DVec2) -> f64 {
     // Pairs, and pairs of pairs: less depth than one product after another.
     let (w2, c) = (w * w, &ATAN);
     let w4 = w2 * w2;
-    let pair = |i: usize| c[i] + c[i + 1] * w;
-    let low4 = pair(0) + pair(2) * w2;
-    let high4 = pair(4) + pair(6) * w2;
-    let top = pair(8) + c[10] * w2;
+    let low4 = (c[0] + c[1] * w) + (c[2] + c[3] * w) * w2;
+    let high4 = (c[4] + c[5] * w) + (c[6] + c[7] * w) * w2;
+    let top = (c[8] + c[9] * w) + c[10] * w2;
     let octant = base + z * (low4 + (high4 + top * w4) * w4);
     let quadrant = if x < y { FRAC_PI_2 - octant } else { octant };
     let half = if v.x < 0.0 { PI - quadrant } else { quadrant };

@@ -28,8 +28,8 @@ fn meets(c: Vec3, a: Vec3, b: Vec3) -> bool {
     if cc < 1.0 {
         return true;
     }
-    // In f32 what is decided by more than its rounding: by the plane across the way to the centre, and by a point that is
-    // near the nearest.
+    // In f32 what is decided by more than its rounding: by the plane across the way to the centre, by a point that is near
+    // the nearest, each axis in turn taking it nearer, and by the plane across the way to that.
     let (aa, bb) = (a.length_squared(), b.length_squared());
     let (ca, cb) = (c.dot(a), c.dot(b));
     let rounding = UNSURE * (1.0 + cc + aa + bb);
@@ -37,8 +37,19 @@ fn meets(c: Vec3, a: Vec3, b: Vec3) -> bool {
     if gap > 0.0 && gap * gap > cc {
         return false;
     }
-    let near = c + a * (-ca / aa).clamp(-1.0, 1.0) + b * (-cb / bb).clamp(-1.0, 1.0);
-    near.length_squared() < 1.0 - rounding || nearest_on_parallelogram(c, a, b) < 1.0
+    let ab = a.dot(b);
+    let (mut s, mut t) = (0.0, 0.0);
+    for _ in 0..2 {
+        s = (-(ca + t * ab) / aa).clamp(-1.0, 1.0);
+        t = (-(cb + s * ab) / bb).clamp(-1.0, 1.0);
+    }
+    let near = c + a * s + b * t;
+    let squared = near.length_squared();
+    let gap = near.dot(c) - near.dot(a).abs() - near.dot(b).abs() - rounding;
+    if gap > 0.0 && gap * gap > squared {
+        return false;
+    }
+    squared < 1.0 - rounding || nearest_on_parallelogram(c, a, b) < 1.0
 }
 
 /// What f32 decides of the parallelograms in lanes, as bits.
@@ -64,9 +75,17 @@ pub fn reach_in_lanes<S: Simd>(simd: S, c: Vec3Lanes<S>, a: Vec3Lanes<S>, b: Vec
         return Reach { meets, unsure: 0 };
     }
     // A vector without length goes nowhere.
-    let near = c + a * (-ca / aa).within_one() + b * (-cb / bb).within_one();
-    let met = open & bits(simd, near.dot(near).less(one - rounding));
-    Reach { meets: meets | met, unsure: open & !met }
+    let (per_aa, per_bb, ab) = (one / aa, one / bb, a.dot(b));
+    let s = (-ca * per_aa).within_one();
+    let t = (-(cb + s * ab) * per_bb).within_one();
+    let s = (-(ca + t * ab) * per_aa).within_one();
+    let t = (-(cb + s * ab) * per_bb).within_one();
+    let near = c + a * s + b * t;
+    let squared = near.dot(near);
+    let gap = near.dot(c) - near.dot(a).abs() - near.dot(b).abs() - rounding;
+    let misses = bits(simd, simd.and_m32s(zero.less(gap), squared.less(gap * gap)));
+    let met = open & bits(simd, squared.less(one - rounding));
+    Reach { meets: meets | met, unsure: open & !met & !misses }
 }
 
 /// Squared distance of the parallelogram `c + s a + t b`, `|s|, |t| ≤ 1`, from the origin.

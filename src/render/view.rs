@@ -39,16 +39,6 @@ impl ViewHit {
         GatherPoint { position: query.center, normal: query.normal, found_along: self.view.direction }
     }
 
-    /// The hit as that estimator sees it, without a copy unless `own` has to hold one.
-    #[inline]
-    pub(super) fn seen<'a>(&'a self, estimator: &dyn Estimator, own: &'a mut View) -> &'a View {
-        if self.flat.is_none() {
-            return &self.view;
-        }
-        *own = self.seen_by(estimator);
-        own
-    }
-
     /// The hit as that estimator sees it.
     #[inline]
     pub fn seen_by(&self, estimator: &dyn Estimator) -> View {

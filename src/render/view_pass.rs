@@ -475,9 +475,7 @@ impl ViewPass<'_> {
 
     /// Appends the photons of one hit to the scratch's indices; returns the radius of the disc, if it asks for one.
     fn gather(&self, (kind, map): (PhotonKind, &PhotonMap), slot: &Slot, hit: usize, scratch: &mut Scratch) -> f32 {
-        let mut own = scratch.hits[hit].view;
-        let query = scratch.hits[hit].seen(slot.estimator, &mut own).query;
-        let (indices, nearest) = (&mut scratch.indices, &mut scratch.nearest[kind as usize]);
+        let indices = &mut scratch.indices;
         if slot.gather == Gather::Overlap {
             let together = &mut scratch.together[kind as usize];
             if !together.holds(hit) {
@@ -494,6 +492,8 @@ impl ViewPass<'_> {
                 return 0.0;
             }
         }
+        let query = scratch.hits[hit].seen_by(slot.estimator).query;
+        let nearest = &mut scratch.nearest[kind as usize];
         let k = self.tracer.settings.k;
         match (slot.estimator.lookup(), slot.gather) {
             (Lookup::Disc, _) => {
