@@ -13,6 +13,7 @@ use cusp::photons::irradiance::surface_area::SurfaceAreas;
 use cusp::photons::irradiance::{GlobalPhotons, IrradiancePyramid, PyramidSettings};
 use cusp::photons::kd_tree::Nearest;
 use cusp::photons::map::{FootprintLimits, MapParts, Query};
+use cusp::photons::together::{TOGETHER, Together};
 use cusp::photons::{PhotonKind, PhotonMap, StoredPhoton};
 use cusp::render::Silent;
 use cusp::render::film::{Film, Rect};
@@ -73,6 +74,22 @@ fn gather_and_estimate(c: &mut Criterion) {
         b.iter(|| {
             found.clear();
             views.iter().for_each(|v| map.overlapping_parallelogram(&v.query, &mut found));
+            found.len()
+        });
+    });
+    group.bench_function("overlap_parallelogram_together", |b| {
+        let mut together = Together::default();
+        b.iter(|| {
+            found.clear();
+            for near in views.chunks(TOGETHER) {
+                map.parallelograms_together(0, near.iter().map(|v| v.query), &mut together);
+                for (i, v) in near.iter().enumerate() {
+                    match together.of(i) {
+                        Some(own) => found.extend_from_slice(own),
+                        None => map.overlapping_parallelogram(&v.query, &mut found),
+                    }
+                }
+            }
             found.len()
         });
     });

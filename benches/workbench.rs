@@ -4,7 +4,7 @@
 #![allow(clippy::expect_used, missing_docs, reason = "a failed expectation is how this program reports")]
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use cusp::export::session::Session;
+use cusp::export::session::{Mode, Session};
 use cusp::workbench::Workbench;
 use cusp::workbench::document::Opened;
 use egui::{Context, Pos2, RawInput, Rect, vec2};
@@ -154,14 +154,20 @@ fn opening(_: &mut Criterion) {
     }
 }
 
-/// Frames while passes of ten million photons and of four million pixels are made.
+/// Frames while passes of ten million photons and of four million pixels are made, with differences for panels as well.
 fn far_end(_: &mut Criterion) {
-    for (scene, photons, size) in [("ring", 10_000_000, 2048), ("cornell", 10_000_000, 512)] {
+    let cases = [
+        ("ring", 10_000_000, 2048, Mode::Grid),
+        ("ring", 10_000_000, 2048, Mode::Difference),
+        ("cornell", 10_000_000, 512, Mode::Grid),
+    ];
+    for (scene, photons, size, mode) in cases {
         let mut session = Session { size: Some([size, size]), ..Session::of(scene) };
         session.render.photons = Some(photons);
+        session.comparison.mode = mode;
         let mut window = Window::of(session);
         window.run_for(Duration::from_secs(2));
-        let what = format!("frame under load, {scene}, {photons} photons, {size}x{size} pixels");
+        let what = format!("frame under load, {scene}, {photons} photons, {size}x{size} pixels, {mode:?}");
         summary(&what, (0..FRAMES).map(|_| window.paced()).collect());
     }
 }

@@ -3,6 +3,7 @@
 use super::{Gathered, View};
 use crate::photons::MapPhoton;
 use glam::{DVec3, Vec3};
+use std::ops::Range;
 
 /// Photons whose weights are computed at once.
 pub(super) const BATCH: usize = 64;
@@ -18,7 +19,7 @@ pub(super) trait Pairs: Default {
     /// Number of them.
     fn len(&self) -> usize;
 
-    /// Adds one, unless there are [`BATCH`] of them or it is sure to have no weight.
+    /// Adds one, unless there are [`BATCH`] of them.
     fn push(&mut self, photon: &MapPhoton, view: &View);
 
     /// Forgets them.
@@ -45,9 +46,7 @@ impl Pairs for Parallelograms {
 
     #[inline(always)]
     fn push(&mut self, photon: &MapPhoton, view: &View) {
-        let corners = in_filter_space(photon, view);
-        // Written in any case: whether one is far is hard to foresee, and a branch that goes wrong costs more.
-        self.push_if(!is_far(&corners), corners);
+        self.push_corners(in_filter_space(photon, view));
     }
 
     fn clear(&mut self) {
@@ -62,9 +61,9 @@ impl Parallelograms {
         self.count.next_multiple_of(LANES).min(BATCH)
     }
 
-    /// Adds one by its centre and half-edges if it `counts`, unless there are [`BATCH`] of them.
+    /// Adds one by its centre and half-edges, unless there are [`BATCH`] of them.
     #[inline(always)]
-    pub fn push_if(&mut self, counts: bool, corners: [Vec3; 3]) {
+    pub fn push_corners(&mut self, corners: [Vec3; 3]) {
         let at = self.count;
         if at < BATCH {
             for (of, v) in self.corners.iter_mut().zip(corners) {
@@ -72,7 +71,7 @@ impl Parallelograms {
                     of[at] = x;
                 }
             }
-            self.count += usize::from(counts);
+            self.count += 1;
         }
     }
 
@@ -152,8 +151,13 @@ struct Batch<'a, 'b, P, M> {
 impl<'a, P: Pairs, M: Fn(&P, &mut [f64; BATCH])> Batch<'a, '_, P, M> {
     /// Adds a hit.
     fn add(&mut self, gathered: &Gathered<'a>, view: &View) {
+        // Of many nearest photons most are far; of few each is computed with less than it takes to find out.
+        let are_many = gathered.indices.len() > BATCH;
         for &i in gathered.indices {
             let photon = &gathered.photons[i as usize];
+            if are_many && is_far(&in_filter_space(photon, view)) {
+                continue;
+            }
             self.photons[self.pairs.len()] = Some(photon);
             self.pairs.push(photon, view);
             if self.pairs.len() == BATCH {
@@ -171,23 +175,24 @@ impl<'a, P: Pairs, M: Fn(&P, &mut [f64; BATCH])> Batch<'a, '_, P, M> {
     fn finish(&mut self) {
         let mut means = [0.0; BATCH];
         (self.means)(&self.pairs, &mut means);
-        let mut ends = self.ends[..self.hits].iter().peekable();
-        let pairs = self.photons.iter().zip(means).take(self.pairs.len());
-        for (i, (photon, mean)) in pairs.enumerate() {
-            while ends.next_if_eq(&&i).is_some() {
-                (self.put)(std::mem::take(&mut self.sum));
-            }
-            if let Some(photon) = photon {
-                let weight = weight_by_mean(mean, photon);
-                if weight != 0.0 {
-                    self.sum += photon.power.as_dvec3() * weight;
-                }
-            }
-        }
-        for _ in ends {
+        let mut from = 0;
+        for hit in 0..self.hits {
+            let to = self.ends[hit];
+            self.add_up(from..to, &means);
             (self.put)(std::mem::take(&mut self.sum));
+            from = to;
         }
+        self.add_up(from..self.pairs.len(), &means);
         self.pairs.clear();
         self.hits = 0;
+    }
+
+    /// Adds the photons at these places to the sum of their hit.
+    fn add_up(&mut self, places: Range<usize>, means: &[f64; BATCH]) {
+        for (photon, mean) in self.photons[places.clone()].iter().zip(&means[places]) {
+            if let Some(photon) = photon {
+                self.sum += photon.power.as_dvec3() * weight_by_mean(*mean, photon);
+            }
+        }
     }
 }

@@ -66,7 +66,7 @@ impl MultiSampled {
     /// Mean of `(1 - u)²` over the points `c + s a + t b` of filter space.
     pub fn mean(&self, c: Vec3, a: Vec3, b: Vec3) -> f64 {
         let (mut one, mut means) = (Parallelograms::default(), [0.0; BATCH]);
-        one.push_if(true, [c, a, b]);
+        one.push_corners([c, a, b]);
         self.means(&one, &mut means);
         means[0]
     }

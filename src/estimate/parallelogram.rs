@@ -475,7 +475,7 @@ mod tests {
                 })
                 .collect();
             all.clear();
-            own.iter().for_each(|corners| all.push_if(true, *corners));
+            own.iter().for_each(|corners| all.push_corners(*corners));
             assert_eq!(all.len(), own.len());
             means_over_parallelograms(&all, &mut means);
             for ([c, a, b], m) in own.iter().zip(means) {

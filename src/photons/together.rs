@@ -68,7 +68,6 @@ impl Together {
 struct Queries {
     /// Corners of the box, centre, half-edges and normal. The box of a lane without query is met by nothing.
     vectors: [[[f32; TOGETHER]; 3]; 6],
-    own: [Option<Query>; TOGETHER],
     low: Vec3,
     high: Vec3,
 }
@@ -78,7 +77,7 @@ impl Default for Queries {
         let mut vectors = [[[0.0; TOGETHER]; 3]; 6];
         vectors[0] = [[f32::INFINITY; TOGETHER]; 3];
         vectors[1] = [[f32::NEG_INFINITY; TOGETHER]; 3];
-        Self { vectors, own: [None; TOGETHER], low: Vec3::INFINITY, high: Vec3::NEG_INFINITY }
+        Self { vectors, low: Vec3::INFINITY, high: Vec3::NEG_INFINITY }
     }
 }
 
@@ -92,7 +91,12 @@ impl Queries {
                 lanes[lane] = x;
             }
         }
-        self.own[lane] = Some(query);
+    }
+
+    /// The query of a lane.
+    fn query(&self, lane: usize) -> Query {
+        let of = |which: usize| Vec3::from_array(self.vectors[which].each_ref().map(|x| x[lane]));
+        Query { center: of(2), normal: of(5), axes: [of(3), of(4)] }
     }
 
     #[inline(always)]
@@ -193,8 +197,7 @@ fn tested<S: Simd, const POINT: bool>(simd: S, photon: &MapPhoton, queries: &Que
     let mut unsure = lit & reach.unsure;
     while unsure != 0 {
         let lane = unsure.trailing_zeros();
-        let query = queries.own.get(group * S::F32_LANES + lane as usize).copied().flatten();
-        if query.is_some_and(|query| exactly_meets(photon, &query)) {
+        if exactly_meets(photon, &queries.query(group * S::F32_LANES + lane as usize)) {
             found |= 1 << lane;
         }
         unsure &= unsure - 1;
@@ -220,9 +223,9 @@ mod tests {
             let sequence = Sequence::new(Sampling::Random, n);
             let turned = |i: u64, set: u32| {
                 let (x, y) = (sequence.four(i, set), sequence.four(i, set + 1));
-                let normal = if i % 4 > 0 { Vec3::Y } else { uniform_sphere(y[0], y[1]).normalize() };
+                let normal = if i.is_multiple_of(4) { uniform_sphere(y[0], y[1]).normalize() } else { Vec3::Y };
                 let (t, b) = tangents(normal);
-                let size = 0.05 * x[3] * x[3];
+                let size = 0.1 * x[3] * x[3];
                 (Vec3::new(x[0], x[1] * 0.1, x[2]), normal, [t * size + b * (size * y[2]), b * (size * y[3])])
             };
             let photons: Vec<Photon> = (0..n)

@@ -39,6 +39,12 @@ impl ViewHit {
         GatherPoint { position: query.center, normal: query.normal, found_along: self.view.direction }
     }
 
+    /// Where that estimator looks photons up.
+    #[inline]
+    pub fn query_of(&self, estimator: &dyn Estimator) -> Query {
+        query_of(self.view.query, self.flat, estimator)
+    }
+
     /// The hit as that estimator sees it.
     #[inline]
     pub fn seen_by(&self, estimator: &dyn Estimator) -> View {
@@ -49,10 +55,12 @@ impl ViewHit {
 /// What an estimator sees at a hit of the ray's own `view` in a pixel whose part `flat` may take its place.
 #[inline]
 pub(super) fn seen_by(view: View, flat: Option<Query>, estimator: &dyn Estimator) -> View {
-    match flat {
-        Some(query) if estimator.is_exact_mean() => View { query, ..view },
-        _ => view,
-    }
+    View { query: query_of(view.query, flat, estimator), ..view }
+}
+
+#[inline]
+fn query_of(own: Query, flat: Option<Query>, estimator: &dyn Estimator) -> Query {
+    flat.filter(|_| estimator.is_exact_mean()).unwrap_or(own)
 }
 
 /// Counts that only view paths have.

@@ -480,7 +480,7 @@ impl ViewPass<'_> {
             let together = &mut scratch.together[kind as usize];
             if !together.holds(hit) {
                 let next = scratch.hits[hit..].iter().take(TOGETHER);
-                let seen = next.map(|hit| hit.seen_by(slot.estimator).query);
+                let seen = next.map(|hit| hit.query_of(slot.estimator));
                 match slot.estimator.lookup() {
                     Lookup::Point => map.points_together(hit, seen.map(|query| at_point(&query)), together),
                     Lookup::Parallelogram => map.parallelograms_together(hit, seen, together),
@@ -492,7 +492,7 @@ impl ViewPass<'_> {
                 return 0.0;
             }
         }
-        let query = scratch.hits[hit].seen_by(slot.estimator).query;
+        let query = scratch.hits[hit].query_of(slot.estimator);
         let nearest = &mut scratch.nearest[kind as usize];
         let k = self.tracer.settings.k;
         match (slot.estimator.lookup(), slot.gather) {

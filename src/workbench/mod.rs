@@ -20,6 +20,7 @@ pub mod gallery;
 pub mod history;
 pub mod inspector;
 pub mod layout;
+mod measuring;
 pub mod messages;
 pub mod overlays;
 pub mod painter;
