@@ -175,3 +175,40 @@ impl<S: Simd> Mul<Lanes<S>> for Vec3Lanes<S> {
         Self { x: self.x * factor, y: self.y * factor, z: self.z * factor }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use pulp::{Arch, WithSimd};
+
+    /// Eight numbers: which are less than 1, and which are less than -0.5 when they are kept within one.
+    struct Masks([f32; 8]);
+
+    impl WithSimd for Masks {
+        type Output = [u32; 2];
+
+        fn with_simd<S: Simd>(self, simd: S) -> [u32; 2] {
+            let mut all = [0; 2];
+            for group in 0..8 / S::F32_LANES {
+                let x = Lanes::of(simd, &self.0, group);
+                let own = [
+                    bits(simd, x.less(Lanes::splat(simd, 1.0))),
+                    bits(simd, x.within_one().less(Lanes::splat(simd, -0.5))),
+                ];
+                for (all, own) in all.iter_mut().zip(own) {
+                    *all |= own << (group * S::F32_LANES);
+                }
+            }
+            all
+        }
+    }
+
+    /// The same bits in the widest instructions and in none, also of what is no number.
+    #[test]
+    fn masks_are_the_same_in_all_instructions() {
+        let x = [0.5, -2.0, f32::NAN, 3.0, -0.0, 1.0, f32::INFINITY, f32::NEG_INFINITY];
+        for arch in [Arch::new(), Arch::Scalar] {
+            assert_eq!(arch.dispatch(Masks(x)), [0b1001_0011, 0b1000_0110]);
+        }
+    }
+}
