@@ -4,6 +4,7 @@
 //! other way, into the photon's plane and its footprint coordinates: an affine map, so that coverage and centroid are
 //! the same, and the photon's polygon is the same square or regular polygon for all photons. The clipped vertices
 //! carry their parameters in the view footprint along, which maps the centroid back (eq. 66) without an inverse.
+//! With the square and the kernel at the centroid nothing is clipped but narrow view footprints: see `coverage.rs`.
 
 use super::{Construction, Estimator, Gathered, Lookup, SamplingPoint, View, weighted_sum};
 use crate::estimate::batch::{self, BATCH, in_filter_space, weight_by_mean};

@@ -8,6 +8,7 @@
 
 use super::View;
 use crate::estimate::batch::{self, BATCH, LANES};
+use crate::estimate::parallelogram::within;
 use crate::photons::MapPhoton;
 use glam::{DVec2, DVec3, Vec3};
 use pulp::{Arch, Simd, WithSimd};
@@ -21,20 +22,23 @@ const UNKNOWN: f64 = -1.0;
 
 /// A photon and a view footprint.
 pub(super) struct Pair {
-    /// As in [`MapPhoton`].
+    /// First two rows of the photon's filter transform, 1/metre, as [`MapPhoton`] has what follows too.
     rows: [DVec3; 2],
+    /// Unit normal of the photon's surface.
     normal: DVec3,
+    /// Inverse of the photon's longest semi-axis, 1/metre.
     inverse_reach: f64,
+    /// Cosine and sine of the turn from filter coordinates to those in `dα` and `dβ`.
     turn: DVec2,
-    /// From the photon to the centre of the view footprint, and its half-edges.
+    /// From the photon to the centre of the view footprint, and its half-edges, metres.
     corners: [DVec3; 3],
-    /// Direction of the view ray.
+    /// Unit direction of the view ray.
     direction: DVec3,
 }
 
 /// Centre and half-edges of a view footprint as a photon sees them.
 struct Seen {
-    /// In its filter space, unprojected, the third coordinate along its normal.
+    /// In its filter space, unprojected; the third coordinate along its normal, metres.
     filter: [(DVec2, f64); 3],
     /// In its footprint, along the view ray.
     own: [DVec2; 3],
@@ -88,7 +92,7 @@ impl Pair {
         (seen.meets && p.x.abs() - reach.x < 1.0 && p.y.abs() - reach.y < 1.0).then_some(seen.own)
     }
 
-    /// `(1 - u)²` of the point of the view footprint with those parameters.
+    /// `(1 - u)²` of the point of the view footprint with those parameters, in `[0, 1]`.
     #[inline(always)]
     pub fn kernel_at(&self, parameter: DVec2) -> f64 {
         let Seen { filter, .. } = self.seen();
@@ -105,7 +109,7 @@ impl Pair {
     }
 
     /// Share of the view footprint that the photon's parallelogram covers, times `(1 - u)²` at the centroid of that part
-    /// (Pedersen 2011, eq. 63 to 67); or [`UNKNOWN`].
+    /// (Pedersen 2011, eq. 63 to 67), in `[0, 1]`; or [`UNKNOWN`].
     #[inline(always)]
     fn covered_kernel(&self) -> f64 {
         let seen = self.seen();
@@ -201,13 +205,6 @@ impl Moments {
 fn between(a: f64, b: f64, low: f64, high: f64) -> (f64, f64) {
     let (less, more) = (if a < b { a } else { b }, if a > b { a } else { b });
     (within(less, low, high), within(more, low, high))
-}
-
-/// A number kept between two others; the lower of these if it is none.
-#[inline(always)]
-fn within(x: f64, low: f64, high: f64) -> f64 {
-    let x = if x > low { x } else { low };
-    if x < high { x } else { high }
 }
 
 /// Numbers of a [`Pair`].

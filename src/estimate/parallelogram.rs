@@ -101,9 +101,9 @@ fn larger(a: f64, b: f64) -> f64 {
     if a > b { a } else { b }
 }
 
-/// A number kept between two others.
+/// A number kept between two others; the lower of these if it is none.
 #[inline(always)]
-fn within(x: f64, low: f64, high: f64) -> f64 {
+pub(super) fn within(x: f64, low: f64, high: f64) -> f64 {
     let x = if x > low { x } else { low };
     if x < high { x } else { high }
 }

@@ -31,29 +31,19 @@ pub struct LiveImage {
 impl LiveImage {
     /// An empty image.
     pub fn new(size: [u32; 2]) -> Self {
-        let image = TiledImage::new(size);
-        let count = image.count();
-        Self {
-            image,
-            tiles: vec![Tile::Empty; count],
-            versions: vec![0; count],
-            seconds: vec![0.0; count],
-            version: 0,
-            passes: 0,
-        }
+        Self::of(TiledImage::new(size), Tile::Empty, 0)
     }
 
     /// An image that is all there.
     pub fn whole(image: TiledImage) -> Self {
+        Self::of(image, Tile::Fresh, 1)
+    }
+
+    /// An image whose tiles are all in the same state since the same change.
+    fn of(image: TiledImage, tile: Tile, version: u64) -> Self {
         let count = image.count();
-        Self {
-            image,
-            tiles: vec![Tile::Fresh; count],
-            versions: vec![1; count],
-            seconds: vec![0.0; count],
-            version: 1,
-            passes: 0,
-        }
+        let (tiles, versions, seconds) = (vec![tile; count], vec![version; count], vec![0.0; count]);
+        Self { image, tiles, versions, seconds, version, passes: 0 }
     }
 
     /// Pixels across and down.
