@@ -26,67 +26,83 @@ pub(super) trait Pairs: Default {
     fn clear(&mut self);
 }
 
-/// View footprints in the filter space of a photon each.
-pub(super) struct Parallelograms {
-    /// Centres and half-edges by coordinate.
-    corners: [[[f32; BATCH]; 3]; 3],
+/// `V` vectors of each of [`LANES`] pairs, by coordinate.
+pub(super) type Group<const V: usize> = [[Lanes; 3]; V];
+
+/// `V` vectors of each of [`BATCH`] pairs at most, in groups of [`LANES`].
+///
+/// A loop over the lanes of one group has no rest: over a number that only the run knows, compilers keep one for single
+/// pairs, and some go through it with the last of full groups.
+pub(super) struct Vectors<const V: usize> {
+    groups: [Group<V>; BATCH / LANES],
     count: usize,
 }
 
-impl Default for Parallelograms {
+impl<const V: usize> Default for Vectors<V> {
     fn default() -> Self {
-        Self { corners: [[[0.0; BATCH]; 3]; 3], count: 0 }
+        Self { groups: [[[[0.0; LANES]; 3]; V]; BATCH / LANES], count: 0 }
     }
 }
 
-impl Pairs for Parallelograms {
-    fn len(&self) -> usize {
+impl<const V: usize> Vectors<V> {
+    /// Number of pairs.
+    #[inline(always)]
+    pub fn len(&self) -> usize {
         self.count
     }
 
+    /// Adds those of one pair, unless there are [`BATCH`] of them.
     #[inline(always)]
-    fn push(&mut self, photon: &MapPhoton, view: &View) {
-        self.push_corners(in_filter_space(photon, view));
-    }
-
-    fn clear(&mut self) {
-        self.count = 0;
-    }
-}
-
-impl Parallelograms {
-    /// The number of which whole lanes can be made; the last ones hold what was there before.
-    #[inline(always)]
-    pub fn in_whole_lanes(&self) -> usize {
-        self.count.next_multiple_of(LANES).min(BATCH)
-    }
-
-    /// Adds one by its centre and half-edges, unless there are [`BATCH`] of them.
-    #[inline(always)]
-    pub fn push_corners(&mut self, corners: [Vec3; 3]) {
-        let at = self.count;
-        if at < BATCH {
-            for (of, v) in self.corners.iter_mut().zip(corners) {
+    pub fn push(&mut self, vectors: [Vec3; V]) {
+        if let Some(group) = self.groups.get_mut(self.count / LANES) {
+            for (of, v) in group.iter_mut().zip(vectors) {
                 for (of, x) in of.iter_mut().zip(v.to_array()) {
-                    of[at] = x;
+                    of[self.count % LANES] = x;
                 }
             }
             self.count += 1;
         }
     }
 
-    /// Centre and half-edges of one.
+    /// Forgets all pairs.
     #[inline(always)]
-    pub fn at(&self, i: usize) -> [Vec3; 3] {
-        let [[cx, cy, cz], [ax, ay, az], [bx, by, bz]] = &self.corners;
-        [Vec3::new(cx[i], cy[i], cz[i]), Vec3::new(ax[i], ay[i], az[i]), Vec3::new(bx[i], by[i], bz[i])]
+    pub fn clear(&mut self) {
+        self.count = 0;
     }
 
-    /// Those of [`LANES`], by coordinate; `first` is a multiple of that.
+    /// The groups that pairs are in; the last lanes hold what was there before.
     #[inline(always)]
-    pub fn lanes(&self, first: usize) -> [[Lanes; 3]; 3] {
-        let of = |x: &[f32; BATCH]| std::array::from_fn(|lane| x[first + lane]);
-        self.corners.each_ref().map(|v| v.each_ref().map(of))
+    pub fn groups(&self) -> &[Group<V>] {
+        &self.groups[..self.count.div_ceil(LANES).min(BATCH / LANES)]
+    }
+
+    /// Those of one pair, below [`BATCH`].
+    pub fn at(&self, i: usize) -> [Vec3; V] {
+        self.groups[i / LANES].map(|of| vector(&of, i % LANES))
+    }
+}
+
+/// The vector of one lane.
+#[inline(always)]
+pub(super) fn vector([x, y, z]: &[Lanes; 3], lane: usize) -> Vec3 {
+    Vec3::new(x[lane], y[lane], z[lane])
+}
+
+/// View footprints in the filter space of a photon each: centres and half-edges.
+pub(super) type Parallelograms = Vectors<3>;
+
+impl Pairs for Parallelograms {
+    fn len(&self) -> usize {
+        self.len()
+    }
+
+    #[inline(always)]
+    fn push(&mut self, photon: &MapPhoton, view: &View) {
+        self.push(in_filter_space(photon, view));
+    }
+
+    fn clear(&mut self) {
+        self.clear();
     }
 }
 

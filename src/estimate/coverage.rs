@@ -7,10 +7,10 @@
 //! Every term is a continuous function of the vertices, so that edges that touch or coincide need no case of their own.
 
 use super::View;
-use crate::estimate::batch::{self, BATCH, LANES};
+use crate::estimate::batch::{self, BATCH, Group, LANES, Vectors, vector};
 use crate::estimate::parallelogram::within;
 use crate::photons::MapPhoton;
-use glam::{DVec2, DVec3, Vec3};
+use glam::{DVec2, DVec3};
 use pulp::{Arch, Simd, WithSimd};
 
 /// Cosine below which a photon's plane seen along the ray has no area that f32 could tell.
@@ -57,6 +57,21 @@ impl Pair {
             turn: photon.turn.as_dvec2(),
             corners: [view.query.center - photon.position, a, b].map(|v| v.as_dvec3()),
             direction: view.direction.as_dvec3(),
+        }
+    }
+
+    /// As [`Pairs`] keep it.
+    #[inline(always)]
+    fn of_lane(group: &Group<VECTORS>, lane: usize) -> Self {
+        let [x, y, normal, turn, c, a, b, direction] = group;
+        let turn = vector(turn, lane).as_dvec3();
+        Self {
+            rows: [vector(x, lane).as_dvec3(), vector(y, lane).as_dvec3()],
+            normal: vector(normal, lane).as_dvec3(),
+            inverse_reach: turn.z,
+            turn: turn.truncate(),
+            corners: [vector(c, lane).as_dvec3(), vector(a, lane).as_dvec3(), vector(b, lane).as_dvec3()],
+            direction: vector(direction, lane).as_dvec3(),
         }
     }
 
@@ -207,34 +222,22 @@ fn between(a: f64, b: f64, low: f64, high: f64) -> (f64, f64) {
     (within(less, low, high), within(more, low, high))
 }
 
-/// Numbers of a [`Pair`].
-const NUMBERS: usize = 24;
+/// Vectors of a [`Pair`].
+const VECTORS: usize = 8;
 
-/// Pairs as a structure of arrays.
-pub(super) struct Pairs {
-    numbers: [[f32; BATCH]; NUMBERS],
-    count: usize,
-}
-
-impl Default for Pairs {
-    fn default() -> Self {
-        Self { numbers: [[0.0; BATCH]; NUMBERS], count: 0 }
-    }
-}
+/// Pairs by their vectors.
+#[derive(Default)]
+pub(super) struct Pairs(Vectors<VECTORS>);
 
 impl batch::Pairs for Pairs {
     fn len(&self) -> usize {
-        self.count
+        self.0.len()
     }
 
     #[inline(always)]
     fn push(&mut self, photon: &MapPhoton, view: &View) {
-        let at = self.count;
-        if at >= BATCH {
-            return;
-        }
         let [a, b] = view.query.axes;
-        let vectors = [
+        self.0.push([
             photon.rows[0],
             photon.rows[1],
             photon.normal,
@@ -243,46 +246,22 @@ impl batch::Pairs for Pairs {
             a,
             b,
             view.direction,
-        ];
-        for (numbers, vector) in self.numbers.as_chunks_mut::<3>().0.iter_mut().zip(vectors) {
-            for (numbers, x) in numbers.iter_mut().zip(vector.to_array()) {
-                numbers[at] = x;
-            }
-        }
-        self.count += 1;
+        ]);
     }
 
     fn clear(&mut self) {
-        self.count = 0;
+        self.0.clear();
     }
 }
 
 impl Pairs {
-    #[inline(always)]
-    fn at(&self, i: usize) -> Pair {
-        let turn = self.vector(3, i);
-        Pair {
-            rows: [self.vector(0, i), self.vector(1, i)],
-            normal: self.vector(2, i),
-            inverse_reach: turn.z,
-            turn: turn.truncate(),
-            corners: [self.vector(4, i), self.vector(5, i), self.vector(6, i)],
-            direction: self.vector(7, i),
-        }
-    }
-
-    #[inline(always)]
-    fn vector(&self, which: usize, i: usize) -> DVec3 {
-        let [x, y, z] = [3 * which, 3 * which + 1, 3 * which + 2];
-        Vec3::new(self.numbers[x][i], self.numbers[y][i], self.numbers[z][i]).as_dvec3()
-    }
-
     /// [`Pair::weighed`] of each, to the bit.
     pub fn weighed(&self, kernels: &mut [f64; BATCH], polygon: impl Fn([DVec2; 3]) -> (f64, DVec2)) {
         Arch::new().dispatch(Weighed { pairs: self, kernels });
-        for (i, kernel) in kernels.iter_mut().enumerate().take(self.count) {
+        for (i, kernel) in kernels.iter_mut().enumerate().take(self.0.len()) {
             if *kernel < 0.0 {
-                *kernel = self.at(i).or_polygon(*kernel, &polygon);
+                let group = &self.0.groups()[i / LANES];
+                *kernel = Pair::of_lane(group, i % LANES).or_polygon(*kernel, &polygon);
             }
         }
     }
@@ -299,9 +278,12 @@ impl WithSimd for Weighed<'_> {
 
     #[inline(always)]
     fn with_simd<I: Simd>(self, _: I) {
-        let whole = self.pairs.count.next_multiple_of(LANES).min(BATCH);
-        for (i, kernel) in self.kernels.iter_mut().enumerate().take(whole) {
-            *kernel = self.pairs.at(i).covered_kernel();
+        for (kernels, group) in self.kernels.as_chunks_mut::<LANES>().0.iter_mut().zip(self.pairs.0.groups()) {
+            let mut own = [0.0; LANES];
+            for (lane, own) in own.iter_mut().enumerate() {
+                *own = Pair::of_lane(group, lane).covered_kernel();
+            }
+            *kernels = own;
         }
     }
 }
@@ -312,7 +294,7 @@ mod tests {
     use crate::estimate::clip::{self, ClippedPolygon, SQUARE_VERTICES};
     use crate::math::sequence::{Sampling, Sequence};
     use batch::Pairs as _;
-    use glam::Vec2;
+    use glam::{Vec2, Vec3};
     use std::f64::consts::TAU;
 
     fn clipped([p, a, b]: [DVec2; 3]) -> (f64, DVec2) {

@@ -1,11 +1,11 @@
 //! `multi_sampled`: the kernel averaged over points of the view footprint (Pedersen 2011, eq. 68 to 71).
 
 use super::{Construction, Estimator, Gathered, Lookup, SamplingPoint, View};
-use crate::estimate::batch::{self, BATCH, LANES, Lanes, Parallelograms, in_filter_space, weight_by_mean};
+use crate::estimate::batch::{self, BATCH, Group, LANES, Parallelograms, in_filter_space, vector, weight_by_mean};
 use crate::estimate::settings::{Spec, SpecError};
 use crate::photons::MapPhoton;
 use glam::{DVec3, Vec3};
-use pulp::{Arch, Simd, WithSimd};
+use pulp::{Simd, WithSimd};
 
 /// Where the sampling points lie in `[-1, 1]`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -66,20 +66,22 @@ impl MultiSampled {
     /// Mean of `(1 - u)²` over the points `c + s a + t b` of filter space.
     pub fn mean(&self, c: Vec3, a: Vec3, b: Vec3) -> f64 {
         let (mut one, mut means) = (Parallelograms::default(), [0.0; BATCH]);
-        one.push_corners([c, a, b]);
+        one.push([c, a, b]);
         self.means(&one, &mut means);
         means[0]
     }
 
     fn means(&self, parallelograms: &Parallelograms, means: &mut [f64; BATCH]) {
-        Arch::new().dispatch(Means { of: self, parallelograms, means });
+        crate::math::lanes::dispatch_in_eights(Means { of: self, parallelograms, means });
     }
 
     /// Sums of `(1 - u)²` over the points of eight parallelograms; `FLAT` if they lie in the planes of their photons.
     #[inline(always)]
-    fn sums<const FLAT: bool>(&self, [c, a, b]: &[[Lanes; 3]; 3]) -> [f64; LANES] {
+    fn sums<const FLAT: bool>(&self, [c, a, b]: &Group<3>) -> [f64; LANES] {
         // Sums in f32 are kept short: what thousands of terms lose to rounding is as much as they differ by.
         let mut all = [0.0f64; LANES];
+        // `s a` of one group of columns: up to eight points a side are one, and these are the same in all rows.
+        let (mut along, mut held) = ([[[0.0f32; LANES]; 3]; COLUMNS], usize::MAX);
         for rows in self.offsets.chunks(ROWS) {
             let mut sums = [[0.0f32; LANES]; COLUMNS];
             for &t in rows {
@@ -89,13 +91,23 @@ impl MultiSampled {
                         row[axis][l] = c[axis][l] + b[axis][l] * t;
                     }
                 }
-                for (offsets, weights) in &self.columns {
-                    for ((sum, &s), &weight) in sums.iter_mut().zip(offsets).zip(weights) {
+                for (group, (offsets, weights)) in self.columns.iter().enumerate() {
+                    if held != group {
+                        for (along, &s) in along.iter_mut().zip(offsets) {
+                            for axis in 0..3 {
+                                for l in 0..LANES {
+                                    along[axis][l] = a[axis][l] * s;
+                                }
+                            }
+                        }
+                        held = group;
+                    }
+                    for ((sum, along), &weight) in sums.iter_mut().zip(&along).zip(weights) {
                         for l in 0..LANES {
-                            let (x, y) = (row[0][l] + a[0][l] * s, row[1][l] + a[1][l] * s);
+                            let (x, y) = (row[0][l] + along[0][l], row[1][l] + along[1][l]);
                             let mut u = x * x + y * y;
                             if !FLAT {
-                                let z = row[2][l] + a[2][l] * s;
+                                let z = row[2][l] + along[2][l];
                                 u += z * z;
                             }
                             let k = 1.0 - u;
@@ -128,16 +140,16 @@ impl WithSimd for Means<'_> {
     #[inline(always)]
     fn with_simd<I: Simd>(self, _: I) {
         let points = f64::from(self.of.n * self.of.n);
-        for first in (0..self.parallelograms.in_whole_lanes()).step_by(LANES) {
-            let lanes = self.parallelograms.lanes(first);
+        for (means, group) in self.means.as_chunks_mut::<LANES>().0.iter_mut().zip(self.parallelograms.groups()) {
+            let [c, a, b] = group;
             // On flat ground nothing lies off the photons' planes, and a third of the work is for nothing.
-            let flat = lanes.iter().all(|v| v[2] == [0.0; LANES]);
-            let sums = if flat { self.of.sums::<true>(&lanes) } else { self.of.sums::<false>(&lanes) };
-            for (i, sum) in sums.into_iter().enumerate() {
-                let [c, a, b] = self.parallelograms.at(first + i);
+            let flat = c[2] == [0.0; LANES] && a[2] == [0.0; LANES] && b[2] == [0.0; LANES];
+            let sums = if flat { self.of.sums::<true>(group) } else { self.of.sums::<false>(group) };
+            for (lane, mean) in means.iter_mut().enumerate() {
+                let [c, a, b] = [vector(c, lane), vector(a, lane), vector(b, lane)];
                 let (cc, aa, bb) = (c.length_squared(), a.length_squared(), b.length_squared());
                 let reach = 1.0 + aa.sqrt() + bb.sqrt();
-                self.means[first + i] = if cc >= reach * reach { 0.0 } else { sum / points };
+                *mean = if cc >= reach * reach { 0.0 } else { sums[lane] / points };
             }
         }
     }

@@ -5,7 +5,7 @@
 //! compiler makes lanes of it only where all ends up in one function: nothing on the way is a closure or a `map` of an array,
 //! which may stay functions of their own.
 
-use crate::estimate::batch::{BATCH, Pairs, Parallelograms};
+use crate::estimate::batch::{BATCH, LANES, Parallelograms, vector};
 use crate::estimate::polygon::{GAUSS, SHORT, THIN};
 use crate::math::angle::angle;
 use glam::{DVec2, DVec3, Vec3};
@@ -46,9 +46,13 @@ impl WithSimd for Means<'_> {
 
     #[inline(always)]
     fn with_simd<I: Simd>(self, _: I) {
-        for (i, m) in self.means.iter_mut().enumerate().take(self.of.in_whole_lanes()) {
-            let [c, a, b] = self.of.at(i);
-            *m = mean(c.as_dvec3(), a.as_dvec3(), b.as_dvec3());
+        for (means, [c, a, b]) in self.means.as_chunks_mut::<LANES>().0.iter_mut().zip(self.of.groups()) {
+            let mut own = [0.0; LANES];
+            for (lane, own) in own.iter_mut().enumerate() {
+                let [c, a, b] = [vector(c, lane), vector(a, lane), vector(b, lane)];
+                *own = mean(c.as_dvec3(), a.as_dvec3(), b.as_dvec3());
+            }
+            *means = own;
         }
     }
 }
@@ -475,7 +479,7 @@ mod tests {
                 })
                 .collect();
             all.clear();
-            own.iter().for_each(|corners| all.push_corners(*corners));
+            own.iter().for_each(|corners| all.push(*corners));
             assert_eq!(all.len(), own.len());
             means_over_parallelograms(&all, &mut means);
             for ([c, a, b], m) in own.iter().zip(means) {

@@ -5,9 +5,20 @@
 //! closures and no `map` of arrays go between: they are functions of their own, compiled for any processor.
 
 use glam::Vec3;
-use pulp::Simd;
+use pulp::{Arch, Simd, WithSimd};
 use std::any::Any;
 use std::ops::{Add, Div, Mul, Neg, Sub};
+
+/// Runs `kernel` in the widest instructions that the processor has, whose registers hold eight numbers of 32 bits at most:
+/// what is written for eight lanes.
+#[inline(always)]
+pub fn dispatch_in_eights<K: WithSimd>(kernel: K) -> K::Output {
+    #[cfg(target_arch = "x86_64")]
+    if let Some(v3) = pulp::x86::V3::try_new() {
+        return Simd::vectorize(v3, kernel);
+    }
+    Arch::Scalar.dispatch(kernel)
+}
 
 /// A mask as bits, the first lane the lowest.
 #[inline(always)]
@@ -179,7 +190,6 @@ impl<S: Simd> Mul<Lanes<S>> for Vec3Lanes<S> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use pulp::{Arch, WithSimd};
 
     /// Eight numbers: which are less than 1, and which are less than -0.5 when they are kept within one.
     struct Masks([f32; 8]);

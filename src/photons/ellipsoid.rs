@@ -112,7 +112,7 @@ fn nearest_on_parallelogram(c: Vec3, a: Vec3, b: Vec3) -> f32 {
 mod tests {
     use super::*;
     use crate::math::sequence::{Sampling, Sequence};
-    use pulp::{Arch, WithSimd};
+    use pulp::WithSimd;
 
     /// One parallelogram in all lanes, and how many there are.
     struct InLanes([Vec3; 3]);
@@ -148,7 +148,7 @@ mod tests {
             }
             let exact = nearest < 1.0;
             assert_eq!(meets(c, a, b), exact, "{c} {a} {b}");
-            let reach = Arch::new().dispatch(InLanes([c, a, b]));
+            let reach = crate::math::lanes::dispatch_in_eights(InLanes([c, a, b]));
             let all = u32::MAX >> (32 - reach.1);
             assert!([0, all].contains(&reach.0.meets) && [0, all].contains(&reach.0.unsure));
             assert!(reach.0.unsure != 0 || (reach.0.meets != 0) == exact, "{c} {a} {b}");

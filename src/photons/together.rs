@@ -6,7 +6,7 @@ use super::map::{MapPhoton, NORMAL_AGREEMENT, Query};
 use super::overlap::{OverlapTree, Visit, Walk, corners};
 use crate::math::lanes::{Lanes, Vec3Lanes, bits};
 use glam::Vec3;
-use pulp::{Arch, Simd, WithSimd};
+use pulp::{Simd, WithSimd};
 use std::ops::Range;
 
 /// Look-ups that are done at once, at most.
@@ -59,7 +59,7 @@ impl Together {
         self.is_apart = false;
         let finding = Finding::<POINT> { photons, tree, queries: &lanes, count, together: self, seen: 0, met: 0 };
         if count > 0 && !tree.is_empty() {
-            Arch::new().dispatch(finding);
+            crate::math::lanes::dispatch_in_eights(finding);
         }
     }
 }

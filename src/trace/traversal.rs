@@ -5,7 +5,7 @@
 
 use glam::Vec3;
 use obvhs::cwbvh::node::CwBvhNode;
-use pulp::{Arch, Simd, WithSimd};
+use pulp::{Simd, WithSimd};
 
 /// A ray made ready for the box test.
 #[derive(Clone, Copy, Debug)]
@@ -28,7 +28,7 @@ pub trait LeafTest {
 #[inline]
 pub fn traverse(nodes: &[CwBvhNode], ray: &BoxRay, limit: f32, test: &mut impl LeafTest) {
     if !nodes.is_empty() {
-        Arch::new().dispatch(Traversal { nodes, ray, limit, test });
+        crate::math::lanes::dispatch_in_eights(Traversal { nodes, ray, limit, test });
     }
 }
 

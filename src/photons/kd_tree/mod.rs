@@ -12,7 +12,6 @@ pub use nearest::Nearest;
 
 use build::{build, node_count};
 use glam::Vec3;
-use pulp::Arch;
 use rayon::prelude::*;
 use scan::{Search, SearchNearest, SearchOne, SearchWithin};
 
@@ -213,7 +212,7 @@ impl KdTree {
         }
         found.begin(k, limit);
         let scan = &mut SearchNearest { first, center, volume, found, accept };
-        Arch::new().dispatch(Search { tree: self, center, scan });
+        crate::math::lanes::dispatch_in_eights(Search { tree: self, center, scan });
         found.finish();
     }
 
@@ -239,7 +238,7 @@ impl KdTree {
     #[inline]
     pub fn within(&self, center: Vec3, radius: f32, visit: impl FnMut(u32, Vec3)) {
         let scan = &mut SearchWithin { center, limit: (radius * radius).min(f32::MAX), visit };
-        Arch::new().dispatch(Search { tree: self, center, scan });
+        crate::math::lanes::dispatch_in_eights(Search { tree: self, center, scan });
     }
 
     /// The nearest entry within `radius` of `center` (metres) that `accept` takes, and its squared distance; of those at
@@ -247,7 +246,7 @@ impl KdTree {
     #[inline]
     pub fn nearest_one(&self, center: Vec3, radius: f32, accept: impl Fn(u32) -> bool) -> Option<(u32, f32)> {
         let mut scan = SearchOne { center, limit: (radius * radius).min(f32::MAX), best: None, accept };
-        Arch::new().dispatch(Search { tree: self, center, scan: &mut scan });
+        crate::math::lanes::dispatch_in_eights(Search { tree: self, center, scan: &mut scan });
         scan.best
     }
 }

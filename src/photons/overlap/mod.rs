@@ -10,7 +10,6 @@ mod walk;
 
 pub(super) use curve::packing_order;
 use glam::Vec3;
-use pulp::Arch;
 use rayon::prelude::*;
 use walk::{DEEPEST, Each};
 pub(super) use walk::{Visit, Walk};
@@ -121,7 +120,7 @@ impl OverlapTree {
     #[inline]
     pub fn in_box(&self, center: Vec3, half: Vec3, visit: impl FnMut(u32)) {
         let (low, high) = corners((center, half));
-        Arch::new().dispatch(Walk { tree: self, low, high, visit: Each(visit) });
+        crate::math::lanes::dispatch_in_eights(Walk { tree: self, low, high, visit: Each(visit) });
     }
 
     /// Corners of an entry's box, as it is tested.
