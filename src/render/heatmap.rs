@@ -13,11 +13,11 @@ use crate::render::photon_pass::PhotonMaps;
 use crate::render::plan::{Plan, Slot};
 use crate::render::settings::Gather;
 use crate::render::tiles::tiles;
+use crate::render::turns::in_turn;
 use crate::render::view::{Unrecorded, ViewCounts, ViewHit, ViewTracer};
 use crate::render::view_pass::{Scratch, ViewPass};
 use crate::render::watch::Silent;
 use glam::DVec3;
-use rayon::prelude::*;
 
 /// A quantity of a pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
@@ -159,10 +159,9 @@ impl<'a> HeatmapPass<'a> {
     pub fn run(&self, cancelled: &(dyn Fn() -> bool + Sync)) -> Option<Vec<f32>> {
         let size = self.pass.settings.size;
         let all = tiles(Rect::whole(size));
-        let done: Vec<Option<Vec<f32>>> = all
-            .par_iter()
-            .map_init(Scratch::default, |scratch, rect| (!cancelled()).then(|| self.tile_with(*rect, scratch)))
-            .collect();
+        let done = in_turn(all.len(), Scratch::default, |scratch, number| {
+            (!cancelled()).then(|| self.tile_with(all[number], scratch))
+        });
         let mut image = vec![0.0; size[0] as usize * size[1] as usize];
         for (rect, pixels) in all.iter().zip(done) {
             for (row, line) in pixels?.chunks(rect.width as usize).enumerate() {

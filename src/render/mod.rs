@@ -18,6 +18,7 @@ pub mod stats;
 pub mod stop;
 pub mod tiles;
 pub mod totals;
+mod turns;
 pub mod view;
 pub mod view_pass;
 pub mod watch;

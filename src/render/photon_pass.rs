@@ -10,9 +10,9 @@ use crate::photons::path::{Flight, PathCounts, PathSettings, PhotonRecorder, Spe
 use crate::photons::projection::{Cells, ProjectionMap};
 use crate::photons::{PhotonKind, PhotonMap, StoredPhotons};
 use crate::render::plan::Plan;
+use crate::render::turns::in_turn;
 use crate::scene::Scene;
 use crate::trace::Intersector;
-use rayon::prelude::*;
 use std::ops::Range;
 use std::time::Instant;
 
@@ -73,16 +73,13 @@ impl Emitter<'_> {
     /// Traces pass number `pass`. The result does not depend on the number of threads; a cancelled pass is short.
     pub fn run(&self, pass: u64, cancelled: &(dyn Fn() -> bool + Sync)) -> PhotonPass {
         let departures = Departures::new(self, pass);
-        let parts: Vec<PhotonPass> = departures
-            .chunks
-            .par_iter()
-            .map_init(PhotonPass::default, |part, &chunk| {
-                if !cancelled() {
-                    departures.part(chunk, part);
-                }
-                part.taken()
-            })
-            .collect();
+        let chunks = &departures.chunks;
+        let parts = in_turn(chunks.len(), PhotonPass::default, |part, number| {
+            if !cancelled() {
+                departures.part(chunks[number], part);
+            }
+            part.taken()
+        });
         let stored = StoredPhotons::joined(&parts.iter().map(|part| &part.stored).collect::<Vec<_>>());
         let mut whole = PhotonPass { stored, ..Default::default() };
         for part in parts {
@@ -97,15 +94,14 @@ impl Emitter<'_> {
     /// Traces pass number `pass` and keeps nothing of it: photons emitted, and stored of each kind.
     pub fn count(&self, pass: u64) -> (u64, [u64; 3]) {
         let departures = Departures::new(self, pass);
-        let of = |part: &mut PhotonPass, chunk: &Chunk| {
-            departures.part(*chunk, part);
+        let counts = in_turn(departures.chunks.len(), PhotonPass::default, |part, number| {
+            departures.part(departures.chunks[number], part);
             let counts = (part.emitted, PhotonKind::ALL.map(|kind| part.stored.of(kind).len() as u64));
             part.clear();
             counts
-        };
+        });
         let add = |a: (u64, [u64; 3]), b: (u64, [u64; 3])| (a.0 + b.0, std::array::from_fn(|i| a.1[i] + b.1[i]));
-        // Whole numbers: the order of the sum is free.
-        departures.chunks.par_iter().map_init(PhotonPass::default, of).reduce(Default::default, add)
+        counts.into_iter().fold(Default::default(), add)
     }
 
     /// Traces one photon of `photons`, which this emitter made as pass `pass`, once more: the one whose path stored

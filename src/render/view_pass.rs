@@ -17,12 +17,12 @@ use crate::render::photon_pass::PhotonMaps;
 use crate::render::plan::Slot;
 use crate::render::settings::Gather;
 use crate::render::tiles::{in_blocks, tiles_of};
+use crate::render::turns::in_turn;
 use crate::render::view::{
     Branch, Unrecorded, ViewCounts, ViewHit, ViewRecorder, ViewTracer, at_point, sample_position,
 };
 use crate::trace::Ray;
 use glam::DVec3;
-use rayon::prelude::*;
 use std::time::Instant;
 
 /// Seconds of one estimator's view pass by part.
@@ -194,18 +194,14 @@ impl ViewPass<'_> {
     pub fn run(&self, region: Rect, slots: &[Slot], watch: &dyn TileWatch) -> ViewResult {
         let start = Instant::now();
         let all = tiles_of(region, self.tile);
-        let results: Vec<Option<TileResult>> = all
-            .par_iter()
-            .enumerate()
-            .map_init(Scratch::default, |scratch, (number, rect)| {
-                if !watch.tile_allowed() {
-                    return None;
-                }
-                let tile = self.tile(*rect, number, slots, scratch, watch)?;
-                watch.tile_done(&tile);
-                Some(tile)
-            })
-            .collect();
+        let results = in_turn(all.len(), Scratch::default, |scratch, number| {
+            if !watch.tile_allowed() {
+                return None;
+            }
+            let tile = self.tile(all[number], number, slots, scratch, watch)?;
+            watch.tile_done(&tile);
+            Some(tile)
+        });
         let wall = start.elapsed().as_secs_f64();
         let tiles: Vec<TileResult> = results.into_iter().flatten().collect();
         let complete = tiles.len() == all.len();
