@@ -3,6 +3,7 @@
 use super::{Construction, Estimator, Gathered, Lookup, SamplingPoint, View};
 use crate::estimate::batch::{self, BATCH, Group, LANES, Parallelograms, in_filter_space, vector, weight_by_mean};
 use crate::estimate::settings::{Spec, SpecError};
+use crate::math::lanes::dispatch_in_eights;
 use crate::photons::MapPhoton;
 use glam::{DVec3, Vec3};
 use pulp::{Simd, WithSimd};
@@ -72,7 +73,7 @@ impl MultiSampled {
     }
 
     fn means(&self, parallelograms: &Parallelograms, means: &mut [f64; BATCH]) {
-        crate::math::lanes::dispatch_in_eights(Means { of: self, parallelograms, means });
+        dispatch_in_eights(Means { of: self, parallelograms, means });
     }
 
     /// Sums of `(1 - u)²` over the points of eight parallelograms; `FLAT` if they lie in the planes of their photons.

@@ -111,6 +111,7 @@ fn nearest_on_parallelogram(c: Vec3, a: Vec3, b: Vec3) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::lanes::dispatch_in_eights;
     use crate::math::sequence::{Sampling, Sequence};
     use pulp::WithSimd;
 
@@ -148,7 +149,7 @@ mod tests {
             }
             let exact = nearest < 1.0;
             assert_eq!(meets(c, a, b), exact, "{c} {a} {b}");
-            let reach = crate::math::lanes::dispatch_in_eights(InLanes([c, a, b]));
+            let reach = dispatch_in_eights(InLanes([c, a, b]));
             let all = u32::MAX >> (32 - reach.1);
             assert!([0, all].contains(&reach.0.meets) && [0, all].contains(&reach.0.unsure));
             assert!(reach.0.unsure != 0 || (reach.0.meets != 0) == exact, "{c} {a} {b}");

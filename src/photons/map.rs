@@ -9,6 +9,7 @@ use crate::photons::overlap::{self, Block, LANES, OverlapTree, packing_order};
 use crate::photons::photon::Footprinted;
 use crate::photons::together::Together;
 use glam::{DVec2, Vec2, Vec3};
+use prefetch_index::prefetch_index;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -174,13 +175,20 @@ impl PhotonMap {
             packing_order(photons, |p| (p.position(), size(p)))
         });
         let (floored, capped) = (AtomicU64::new(0), AtomicU64::new(0));
+        // A group that is not full has its last photon more than once.
+        let place = |group: usize, lane: usize| {
+            let i = (group * LANES + lane).min(count - 1);
+            order.as_ref().map_or(i, |order| order[i] as usize)
+        };
         let group = |group: usize| {
-            // Read all at once: they lie anywhere, and the processor waits for all of them together. A group that is not
-            // full has its last photon more than once.
-            let stored: [P; LANES] = std::array::from_fn(|lane| {
-                let i = (group * LANES + lane).min(count - 1);
-                photons[order.as_ref().map_or(i, |order| order[i] as usize)]
-            });
+            // They lie anywhere in memory: what the next group needs is asked for while this one is made.
+            for lane in 0..LANES {
+                let next = place(group + 1, lane);
+                prefetch_index(photons, next);
+                // Its end lies before the start of the one behind it.
+                prefetch_index(photons, next + 1);
+            }
+            let stored: [P; LANES] = std::array::from_fn(|lane| photons[place(group, lane)]);
             let mut ready = [MapPhoton::NONE; LANES];
             let mut boxes = [(Vec3::ZERO, Vec3::ZERO); LANES];
             let mut bounded = (0, 0);

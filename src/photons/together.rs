@@ -4,7 +4,7 @@
 use super::ellipsoid::{exactly_meets, reach_in_lanes};
 use super::map::{MapPhoton, NORMAL_AGREEMENT, Query};
 use super::overlap::{OverlapTree, Visit, Walk, corners};
-use crate::math::lanes::{Lanes, Vec3Lanes, bits};
+use crate::math::lanes::{Lanes, Vec3Lanes, bits, dispatch_in_eights};
 use glam::Vec3;
 use pulp::{Simd, WithSimd};
 use std::ops::Range;
@@ -59,7 +59,7 @@ impl Together {
         self.is_apart = false;
         let finding = Finding::<POINT> { photons, tree, queries: &lanes, count, together: self, seen: 0, met: 0 };
         if count > 0 && !tree.is_empty() {
-            crate::math::lanes::dispatch_in_eights(finding);
+            dispatch_in_eights(finding);
         }
     }
 }

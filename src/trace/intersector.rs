@@ -9,6 +9,7 @@ use obvhs::BvhBuildParams;
 use obvhs::aabb::Aabb;
 use obvhs::cwbvh::CwBvh;
 use obvhs::cwbvh::builder::build_cwbvh;
+use prefetch_index::prefetch_index;
 use std::time::Duration;
 
 /// A ray in local coordinates.
@@ -165,6 +166,14 @@ impl Intersector {
         Some(Start { traversal: BoxRay { origin, inverse }, moved })
     }
 
+    /// Asks for the memory of an entry.
+    #[inline(always)]
+    fn expect(&self, leaf: usize) {
+        prefetch_index(&self.leaves, leaf);
+        // Its end lies before the next one's start.
+        prefetch_index(&self.leaves, leaf + 1);
+    }
+
     #[inline(always)]
     fn leaf(&self, ray: &Ray, sheared: &ShearedRay, leaf: usize, t_max: f32) -> Option<(f32, f32, f32)> {
         let shape = &self.leaves[leaf];
@@ -212,9 +221,16 @@ impl LeafTest for Closest<'_> {
             if t < self.t || of(leaf) < of(self.leaf) || self.leaf == usize::MAX {
                 (self.t, self.leaf, self.weights) = (t, leaf, [b, c]);
                 *limit = self.start.before(t);
+                // It is looked up in the end.
+                prefetch_index(&self.on.primitives, leaf);
             }
         }
         false
+    }
+
+    #[inline(always)]
+    fn expect(&self, leaf: usize) {
+        self.on.expect(leaf);
     }
 }
 
@@ -233,6 +249,11 @@ impl LeafTest for Any<'_> {
         let hit = self.on.leaf(self.ray, &self.sheared, leaf, self.t_max);
         self.met = hit.is_some_and(|(t, ..)| t < self.t_max);
         self.met
+    }
+
+    #[inline(always)]
+    fn expect(&self, leaf: usize) {
+        self.on.expect(leaf);
     }
 }
 

@@ -3,8 +3,11 @@
 //! The eight boxes of a node are tested at once by arithmetic on lanes, in the widest instructions that the processor has
 //! (the crate `pulp` chooses them when the program runs). They round as the others do: what is met does not depend on them.
 
+use crate::math::lanes::dispatch_in_eights;
 use glam::Vec3;
 use obvhs::cwbvh::node::CwBvhNode;
+use prefetch_index::prefetch_index;
+use pulp::bytemuck::cast_slice;
 use pulp::{Simd, WithSimd};
 
 /// A ray made ready for the box test.
@@ -21,18 +24,27 @@ pub trait LeafTest {
     /// Tests the entry `leaf` of the hierarchy's primitives; `limit` is how far boxes are opened, which it may lower. Returns
     /// whether to end.
     fn test(&mut self, leaf: usize, limit: &mut f32) -> bool;
+
+    /// Is told that this entry is tested soon.
+    fn expect(&self, leaf: usize);
 }
+
+/// Nodes from which a hierarchy and its surfaces are more than the nearest cache holds, so that it pays to ask for memory early.
+const LARGE: usize = 1000;
 
 /// Hands `test` all primitives of the leaves whose boxes the ray meets within `limit` of its start, those of near boxes first
 /// as far as the direction tells.
 #[inline]
 pub fn traverse(nodes: &[CwBvhNode], ray: &BoxRay, limit: f32, test: &mut impl LeafTest) {
-    if !nodes.is_empty() {
-        crate::math::lanes::dispatch_in_eights(Traversal { nodes, ray, limit, test });
+    if nodes.len() > LARGE {
+        dispatch_in_eights(Traversal::<_, true> { nodes, ray, limit, test });
+    } else if !nodes.is_empty() {
+        dispatch_in_eights(Traversal::<_, false> { nodes, ray, limit, test });
     }
 }
 
-struct Traversal<'a, T> {
+/// `AHEAD`: whether memory is asked for as soon as it is known what will be looked at.
+struct Traversal<'a, T, const AHEAD: bool> {
     nodes: &'a [CwBvhNode],
     ray: &'a BoxRay,
     limit: f32,
@@ -49,7 +61,7 @@ const PRIMITIVES: u32 = 0x00ff_ffff;
 /// Groups kept without allocation; a hierarchy over millions of triangles needs a dozen.
 const SHALLOW: usize = 64;
 
-impl<T: LeafTest> WithSimd for Traversal<'_, T> {
+impl<T: LeafTest, const AHEAD: bool> WithSimd for Traversal<'_, T, AHEAD> {
     type Output = ();
 
     #[inline(always)]
@@ -78,6 +90,14 @@ impl<T: LeafTest> WithSimd for Traversal<'_, T> {
             let met = boxes_met(node, ray, octant, limit);
             group = (node.child_base_idx, met & CHILDREN | u32::from(node.imask));
             let mut primitives = met & PRIMITIVES;
+            if AHEAD {
+                expect_children(nodes, node, met, octant);
+                let mut soon = primitives;
+                while soon != 0 {
+                    test.expect((node.primitive_base_idx + soon.trailing_zeros()) as usize);
+                    soon &= soon - 1;
+                }
+            }
             while primitives != 0 {
                 let leaf = node.primitive_base_idx + primitives.trailing_zeros();
                 primitives &= primitives - 1;
@@ -96,6 +116,22 @@ impl<T: LeafTest> WithSimd for Traversal<'_, T> {
                 };
             }
         }
+    }
+}
+
+/// Asks for the memory of all nodes among the children that are `met`: while one of them is awaited, so are the others.
+#[inline(always)]
+fn expect_children(nodes: &[CwBvhNode], node: &CwBvhNode, met: u32, octant: u32) {
+    // A node is five of these long, and nearly always lies in two lines of a cache.
+    let parts = cast_slice::<CwBvhNode, [u8; 16]>(nodes);
+    let mut children = met & CHILDREN;
+    while children != 0 {
+        let slot = (children.trailing_zeros() - 24) ^ octant;
+        let before = (u32::from(node.imask) & !(u32::MAX << slot)).count_ones();
+        let first = 5 * (node.child_base_idx + before) as usize;
+        prefetch_index(parts, first);
+        prefetch_index(parts, first + 4);
+        children &= children - 1;
     }
 }
 

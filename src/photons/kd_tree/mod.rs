@@ -10,6 +10,7 @@ mod scan;
 
 pub use nearest::Nearest;
 
+use crate::math::lanes::dispatch_in_eights;
 use build::{build, node_count};
 use glam::Vec3;
 use rayon::prelude::*;
@@ -212,7 +213,7 @@ impl KdTree {
         }
         found.begin(k, limit);
         let scan = &mut SearchNearest { first, center, volume, found, accept };
-        crate::math::lanes::dispatch_in_eights(Search { tree: self, center, scan });
+        dispatch_in_eights(Search { tree: self, center, scan });
         found.finish();
     }
 
@@ -238,7 +239,7 @@ impl KdTree {
     #[inline]
     pub fn within(&self, center: Vec3, radius: f32, visit: impl FnMut(u32, Vec3)) {
         let scan = &mut SearchWithin { center, limit: (radius * radius).min(f32::MAX), visit };
-        crate::math::lanes::dispatch_in_eights(Search { tree: self, center, scan });
+        dispatch_in_eights(Search { tree: self, center, scan });
     }
 
     /// The nearest entry within `radius` of `center` (metres) that `accept` takes, and its squared distance; of those at
@@ -246,7 +247,7 @@ impl KdTree {
     #[inline]
     pub fn nearest_one(&self, center: Vec3, radius: f32, accept: impl Fn(u32) -> bool) -> Option<(u32, f32)> {
         let mut scan = SearchOne { center, limit: (radius * radius).min(f32::MAX), best: None, accept };
-        crate::math::lanes::dispatch_in_eights(Search { tree: self, center, scan: &mut scan });
+        dispatch_in_eights(Search { tree: self, center, scan: &mut scan });
         scan.best
     }
 }

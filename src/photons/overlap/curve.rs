@@ -1,6 +1,7 @@
 //! The order in which boxes are packed: by size, and among those of like size along Hilbert's curve.
 
 use super::LANES;
+use crate::math::lanes::dispatch_in_eights;
 use glam::Vec3;
 use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
@@ -49,7 +50,7 @@ impl Curve {
         let step = |x: f32| (x as u32).min((1 << BITS) - 1);
         let places = boxes.map(|(center, _)| ((center - self.low) * self.scale).to_array().map(step));
         let steps = std::array::from_fn(|axis| std::array::from_fn(|lane| places[lane][axis]));
-        let along = crate::math::lanes::dispatch_in_eights(Hilbert { steps });
+        let along = dispatch_in_eights(Hilbert { steps });
         let class = |lane: usize| (boxes[lane].1.to_bits() >> 23 & 0xff) / LIKE;
         std::array::from_fn(|lane| u64::from(class(lane)) << (3 * BITS) | along[lane])
     }
@@ -117,8 +118,7 @@ mod tests {
             // The first 512 places of the curve are a cube of eight.
             let row = |i: u32| [[0, 1, 2, 3, 4, 5, 6, 7], [i & 7; LANES], [i >> 3; LANES]];
             let keys = |steps: [[u32; LANES]; 3]| {
-                let keys =
-                    crate::math::lanes::dispatch_in_eights(Hilbert { steps: steps.map(|s| s.map(|x| x << above)) });
+                let keys = dispatch_in_eights(Hilbert { steps: steps.map(|s| s.map(|x| x << above)) });
                 std::array::from_fn(|lane| (keys[lane] >> (3 * above), steps.map(|s| s[lane])))
             };
             let rows: Vec<[(u64, [u32; 3]); LANES]> = (0..64).map(row).map(keys).collect();

@@ -8,6 +8,7 @@
 mod curve;
 mod walk;
 
+use crate::math::lanes::dispatch_in_eights;
 pub(super) use curve::packing_order;
 use glam::Vec3;
 use rayon::prelude::*;
@@ -120,7 +121,7 @@ impl OverlapTree {
     #[inline]
     pub fn in_box(&self, center: Vec3, half: Vec3, visit: impl FnMut(u32)) {
         let (low, high) = corners((center, half));
-        crate::math::lanes::dispatch_in_eights(Walk { tree: self, low, high, visit: Each(visit) });
+        dispatch_in_eights(Walk { tree: self, low, high, visit: Each(visit) });
     }
 
     /// Corners of an entry's box, as it is tested.
