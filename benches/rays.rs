@@ -144,7 +144,7 @@ fn in_pairs(what: &str, rays: &[Ray], theirs: impl Fn(&Ray) -> bool, ours: impl 
     );
 }
 
-/// Seconds that each builder takes, and the rays that its hierarchy then takes in a second.
+/// Seconds that each builder takes, and the rays that its hierarchy then takes in a second: medians of runs in turn.
 fn builders() {
     let all = [
         ("very fast", BvhBuildParams::very_fast_build()),
@@ -155,29 +155,35 @@ fn builders() {
     ];
     for rows in [16, 50, 160, 500] {
         let g = lumpy_ball(rows);
-        let mut rays = Vec::new();
-        for (name, parameters) in all {
+        let count = g.triangles.len();
+        let built = all.map(|(_, parameters)| {
             let start = Instant::now();
             let intersector = Intersector::by(&g, RADIUS, parameters);
-            let build = start.elapsed().as_secs_f64();
-            if rays.is_empty() {
-                rays = bounces(&g, &intersector, RAYS);
-            }
-            let times = (0..5).map(|_| {
+            (intersector, start.elapsed().as_secs_f64())
+        });
+        let rays = bounces(&g, &built[0].0, RAYS);
+        let mut times = [[0.0; TURNS]; 5];
+        for turn in 0..TURNS {
+            for (times, (intersector, _)) in times.iter_mut().zip(&built) {
                 let start = Instant::now();
                 std::hint::black_box(rays.iter().filter(|r| intersector.closest(r).is_some()).count());
-                start.elapsed().as_secs_f64()
-            });
-            let best = times.fold(f64::INFINITY, f64::min) / RAYS as f64;
-            let count = g.triangles.len();
+                times[turn] = start.elapsed().as_secs_f64() / RAYS as f64;
+            }
+        }
+        for (((name, _), (_, build)), times) in all.iter().zip(&built).zip(&mut times) {
+            times.sort_by(f64::total_cmp);
+            let [low, median, high] = [1, 2, 3].map(|q| 1e-6 / times[TURNS - 1 - TURNS * q / 4]);
             println!(
-                "{count} triangles, {name}: built in {build:.4} s, {:.3} Mrays/s, {:.1} rays each by which it is built",
-                1e-6 / best,
-                build / best / count as f64
+                "{count} triangles, {name}: built in {build:.4} s, {median:.3} Mrays/s ({low:.3} to {high:.3}), {:.1} rays \
+                 each by which it is built",
+                build * median * 1e6 / count as f64
             );
         }
     }
 }
+
+/// Runs of each builder's hierarchy in turn.
+const TURNS: usize = 21;
 
 fn main() {
     rays();
