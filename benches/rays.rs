@@ -83,6 +83,8 @@ fn bounces(g: &Geometry, intersector: &Intersector, count: usize) -> Vec<Ray> {
 }
 
 const RAYS: usize = 100_000;
+/// Rays that are asked for at a time, as the photon pass does.
+const COMPANY: usize = 128;
 
 fn rays() {
     let builders = [("medium", BvhBuildParams::medium_build()), ("very slow", BvhBuildParams::very_slow_build())];
@@ -102,14 +104,29 @@ fn rays() {
             bvh.ray_traverse(prepared(r), &mut hit, |ray, leaf| leaves[leaf].intersect(ray))
         };
         let ours = |r: &Ray| intersector.closest(r).is_some();
-        in_pairs(&format!("closest, {count} triangles, builder {name}"), &rays, theirs, ours);
+        let what = format!("{count} triangles, builder {name}");
+        in_pairs(&format!("closest, {what}"), &rays, each(theirs), each(ours));
+        let together = |rays: &[Ray]| {
+            let mut hits = Vec::new();
+            let met = |rays: &[Ray]| {
+                intersector.closest_of(rays, &mut hits);
+                hits.iter().flatten().count()
+            };
+            rays.chunks(COMPANY).map(met).sum()
+        };
+        in_pairs(&format!("closest, {COMPANY} at a time, {what}"), &rays, each(theirs), together);
         let theirs = |r: &Ray| {
             let ray = obvhs::ray::Ray { tmax: 1.0, ..prepared(r) };
             bvh.ray_traverse_miss(ray, |ray, leaf| leaves[leaf].intersect(ray))
         };
         let ours = |r: &Ray| !intersector.any(r, 1.0);
-        in_pairs(&format!("any within 1 m, {count} triangles, builder {name}"), &rays, theirs, ours);
+        in_pairs(&format!("any within 1 m, {what}"), &rays, each(theirs), each(ours));
     }
+}
+
+/// One ray after the other.
+fn each(of: impl Fn(&Ray) -> bool) -> impl Fn(&[Ray]) -> usize {
+    move |rays| rays.iter().filter(|r| of(r)).count()
 }
 
 /// Pairs of runs whose ratio counts.
@@ -117,10 +134,10 @@ const PAIRS: usize = 41;
 
 /// Runs both in turn, as what a machine has to give changes by the second: rays in a second of each by its median, and the
 /// median ratio of their times with its quartiles.
-fn in_pairs(what: &str, rays: &[Ray], theirs: impl Fn(&Ray) -> bool, ours: impl Fn(&Ray) -> bool) {
-    let timed = |of: &dyn Fn(&Ray) -> bool| {
+fn in_pairs(what: &str, rays: &[Ray], theirs: impl Fn(&[Ray]) -> usize, ours: impl Fn(&[Ray]) -> usize) {
+    let timed = |of: &dyn Fn(&[Ray]) -> usize| {
         let start = Instant::now();
-        std::hint::black_box(rays.iter().filter(|r| of(r)).count());
+        std::hint::black_box(of(rays));
         start.elapsed().as_secs_f64()
     };
     // Once for the caches.

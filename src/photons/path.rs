@@ -5,10 +5,10 @@ use crate::math::rgb::{Rgb, mean};
 use crate::math::sequence::Sequence;
 use crate::photons::emission::Emission;
 use crate::photons::spread::{self, DiffuseSpread};
-use crate::photons::{Photon, PhotonKind, StoredPhotons};
+use crate::photons::{Photon, PhotonKind, StoredPhoton, StoredPhotons};
 use crate::scene::{Material, Scene};
 use crate::trace::scatter::{SpecularRay, reflected, refracted, specular_weights};
-use crate::trace::{Differential, Intersector, Ray, Surface};
+use crate::trace::{Differential, Hit, Intersector, Ray, Surface};
 use glam::Vec3;
 use serde::Serialize;
 use std::ops::AddAssign;
@@ -70,6 +70,37 @@ pub struct Flight<'a> {
     pub settings: PathSettings,
     /// Numbers of the pass: set 0 is emission's, set `1 + b` bounce `b`'s.
     pub sequence: Sequence,
+}
+
+/// A photon before it meets its next surface.
+#[derive(Clone, Copy, Debug)]
+pub struct Underway {
+    index: u64,
+    ray: Ray,
+    differential: Differential,
+    power: Rgb,
+    kind: PhotonKind,
+    /// The dielectric that it knows itself to be in.
+    medium: Option<u32>,
+}
+
+impl Underway {
+    /// One that leaves its light with that power, W. `index` names it in the sequence.
+    pub fn new(index: u64, emission: &Emission, power: Rgb) -> Self {
+        let ray = Ray { origin: emission.origin, direction: emission.direction };
+        Self { index, ray, differential: emission.differential, power, kind: PhotonKind::Direct, medium: None }
+    }
+}
+
+/// Photons that are followed together, and what that takes.
+#[derive(Clone, Default)]
+pub struct Company {
+    /// Those on their way, in the order of their indices.
+    pub photons: Vec<Underway>,
+    rays: Vec<Ray>,
+    hits: Vec<Option<Hit>>,
+    /// What they left, with index and bounce.
+    stored: Vec<((u64, u32), PhotonKind, StoredPhoton)>,
 }
 
 /// A surface that a photon meets.
@@ -148,95 +179,152 @@ impl Flight<'_> {
         counts: &mut PathCounts,
         recorder: &mut impl PhotonRecorder,
     ) -> Rgb {
-        let scene = self.scene;
-        let mut ray = Ray { origin: emission.origin, direction: emission.direction };
-        let mut d = emission.differential;
-        let mut power = power;
-        let mut kind = PhotonKind::Direct;
-        let mut medium = None;
+        let mut photon = Underway::new(index, emission, power);
+        let mut store = |kind, photon: Photon| out.of_mut(kind).push(photon.into());
         counts.grazing += u64::from(emission.bounded);
         for bounce in 0..self.settings.max_depth {
-            let Some(hit) = self.intersector.closest(&ray) else {
+            let Some(hit) = self.intersector.closest(&photon.ray) else {
                 return Rgb::ZERO;
             };
-            let material = &scene.materials[scene.geometry.material(hit.primitive as usize)];
-            if material.is_diffuse() && !self.keeps(kind) && !self.settings.global {
-                // It ends here, and leaves nothing: half of those that pass a specular surface by.
+            if !self.meet(&mut photon, &hit, bounce, count, &mut store, counts, recorder) {
                 return Rgb::ZERO;
-            }
-            let surface = Surface::new(scene, &ray, &hit);
-            let v = ray.direction;
-            if self.settings.differentials {
-                d = d.transfer(v, surface.normal, hit.t);
-                counts.differentials += u64::from(d.bound(scene.radius, MAX_ANGLE));
-            }
-            // Made where they are asked for: a photon that is stored and ends asks for none.
-            let numbers = || self.sequence.four(index, 1 + bounce);
-            medium = medium_before(scene, medium, &surface);
-            if let Some(inside) = attenuation(scene, medium, hit.t) {
-                match roulette(power, inside, numbers()[1]) {
-                    Some(kept) => power = kept,
-                    None => return Rgb::ZERO,
-                }
-            }
-            recorder.meets(&PhotonMeeting {
-                surface: &surface,
-                direction: v,
-                distance: hit.t,
-                footprint: d.dp,
-                power,
-                stored: (material.is_diffuse() && self.keeps(kind)).then_some(kind),
-            });
-            match material {
-                Material::Emitter { .. } => return Rgb::ZERO,
-                Material::Diffuse { .. } => {
-                    if self.keeps(kind) {
-                        let (position, normal) = (surface.position, surface.normal);
-                        let photon = Photon { position, direction: v, normal, power, footprint: d.dp };
-                        out.of_mut(kind).push(photon.into());
-                    }
-                    if !self.settings.global {
-                        return Rgb::ZERO;
-                    }
-                    let x = numbers();
-                    let reflectance = material.diffuse_reflectance(surface.uv);
-                    let Some(kept) = roulette(power, reflectance, x[0]) else {
-                        return Rgb::ZERO;
-                    };
-                    power = kept;
-                    kind = PhotonKind::Global;
-                    let w = cosine_hemisphere(surface.normal, x[2], x[3]);
-                    if self.settings.differentials {
-                        let cos = w.dot(surface.normal);
-                        let (next, bounded) = spread::bounce(self.settings.spread, &d, v, w, cos, count);
-                        d = next;
-                        counts.grazing += u64::from(bounded);
-                    }
-                    ray = Ray { origin: surface.leave(scene, w), direction: w };
-                }
-                _ => {
-                    let number = || numbers()[0];
-                    let Some((next, kept, through)) = self.specular(material, &surface, &ray, power, &d, number) else {
-                        return Rgb::ZERO;
-                    };
-                    power = kept;
-                    ray = Ray { origin: next.origin, direction: next.direction };
-                    if self.settings.differentials {
-                        d = next.differential;
-                    }
-                    counts.horizon += u64::from(next.beyond_horizon);
-                    counts.normals += u64::from(next.without_shading);
-                    if through {
-                        medium = medium_behind(&surface);
-                    }
-                    if kind == PhotonKind::Direct {
-                        kind = PhotonKind::Caustic;
-                    }
-                }
             }
         }
         counts.depth += 1;
-        power
+        photon.power
+    }
+
+    /// [`Self::trace`] of each photon of a company, all to one surface before any goes on to the next: their rays are on their
+    /// way together. What is stored is in the same order.
+    ///
+    /// Calls `cut_off` with the power of each that the bounce limit ended, W.
+    pub fn trace_together(
+        &self,
+        company: &mut Company,
+        count: u64,
+        out: &mut StoredPhotons,
+        counts: &mut PathCounts,
+        mut cut_off: impl FnMut(Rgb),
+    ) {
+        let Company { photons, rays, hits, stored } = company;
+        stored.clear();
+        for bounce in 0..self.settings.max_depth {
+            if photons.is_empty() {
+                break;
+            }
+            rays.clear();
+            rays.extend(photons.iter().map(|photon| photon.ray));
+            self.intersector.closest_of(rays, hits);
+            self.scene.geometry.expect(hits.iter().flatten().map(|hit| hit.primitive as usize));
+            let mut hits = hits.iter();
+            photons.retain_mut(|photon| {
+                let Some(hit) = hits.next().and_then(Option::as_ref) else {
+                    return false;
+                };
+                let index = photon.index;
+                let mut store = |kind, photon: Photon| stored.push(((index, bounce), kind, photon.into()));
+                self.meet(photon, hit, bounce, count, &mut store, counts, &mut Unrecorded)
+            });
+        }
+        for photon in photons.drain(..) {
+            counts.depth += 1;
+            cut_off(photon.power);
+        }
+        stored.sort_unstable_by_key(|(place, ..)| *place);
+        stored.drain(..).for_each(|(_, kind, photon)| out.of_mut(kind).push(photon));
+    }
+
+    /// What becomes of a photon at the surface that it `hit`; whether it goes on.
+    #[expect(clippy::too_many_arguments, reason = "outputs that the caller keeps between photons")]
+    #[inline(always)]
+    fn meet(
+        &self,
+        photon: &mut Underway,
+        hit: &Hit,
+        bounce: u32,
+        count: u64,
+        store: &mut impl FnMut(PhotonKind, Photon),
+        counts: &mut PathCounts,
+        recorder: &mut impl PhotonRecorder,
+    ) -> bool {
+        let scene = self.scene;
+        let Underway { index, mut ray, differential: mut d, mut power, mut kind, mut medium } = *photon;
+        let material = &scene.materials[scene.geometry.material(hit.primitive as usize)];
+        if material.is_diffuse() && !self.keeps(kind) && !self.settings.global {
+            // It ends here, and leaves nothing: half of those that pass a specular surface by.
+            return false;
+        }
+        let surface = Surface::new(scene, &ray, hit);
+        let v = ray.direction;
+        if self.settings.differentials {
+            d = d.transfer(v, surface.normal, hit.t);
+            counts.differentials += u64::from(d.bound(scene.radius, MAX_ANGLE));
+        }
+        // Made where they are asked for: a photon that is stored and ends asks for none.
+        let numbers = || self.sequence.four(index, 1 + bounce);
+        medium = medium_before(scene, medium, &surface);
+        if let Some(inside) = attenuation(scene, medium, hit.t) {
+            match roulette(power, inside, numbers()[1]) {
+                Some(kept) => power = kept,
+                None => return false,
+            }
+        }
+        recorder.meets(&PhotonMeeting {
+            surface: &surface,
+            direction: v,
+            distance: hit.t,
+            footprint: d.dp,
+            power,
+            stored: (material.is_diffuse() && self.keeps(kind)).then_some(kind),
+        });
+        match material {
+            Material::Emitter { .. } => return false,
+            Material::Diffuse { .. } => {
+                if self.keeps(kind) {
+                    let (position, normal) = (surface.position, surface.normal);
+                    store(kind, Photon { position, direction: v, normal, power, footprint: d.dp });
+                }
+                if !self.settings.global {
+                    return false;
+                }
+                let x = numbers();
+                let reflectance = material.diffuse_reflectance(surface.uv);
+                let Some(kept) = roulette(power, reflectance, x[0]) else {
+                    return false;
+                };
+                power = kept;
+                kind = PhotonKind::Global;
+                let w = cosine_hemisphere(surface.normal, x[2], x[3]);
+                if self.settings.differentials {
+                    let cos = w.dot(surface.normal);
+                    let (next, bounded) = spread::bounce(self.settings.spread, &d, v, w, cos, count);
+                    d = next;
+                    counts.grazing += u64::from(bounded);
+                }
+                ray = Ray { origin: surface.leave(scene, w), direction: w };
+            }
+            _ => {
+                let number = || numbers()[0];
+                let Some((next, kept, through)) = self.specular(material, &surface, &ray, power, &d, number) else {
+                    return false;
+                };
+                power = kept;
+                ray = Ray { origin: next.origin, direction: next.direction };
+                if self.settings.differentials {
+                    d = next.differential;
+                }
+                counts.horizon += u64::from(next.beyond_horizon);
+                counts.normals += u64::from(next.without_shading);
+                if through {
+                    medium = medium_behind(&surface);
+                }
+                if kind == PhotonKind::Direct {
+                    kind = PhotonKind::Caustic;
+                }
+            }
+        }
+        *photon = Underway { index, ray, differential: d, power, kind, medium };
+        true
     }
 
     fn keeps(&self, kind: PhotonKind) -> bool {

@@ -6,7 +6,9 @@ use crate::math::rgb::{Rgb, mean};
 use crate::math::sequence::{Sampling, Sequence};
 use crate::photons::emission::{Emission, LightShare, emit, share_among, share_photons};
 use crate::photons::map::{FootprintLimits, MapParts};
-use crate::photons::path::{Flight, PathCounts, PathSettings, PhotonRecorder, SpecularBounds, Unrecorded};
+use crate::photons::path::{
+    Company, Flight, PathCounts, PathSettings, PhotonRecorder, SpecularBounds, Underway, Unrecorded,
+};
 use crate::photons::projection::{Cells, ProjectionMap};
 use crate::photons::{PhotonKind, PhotonMap, StoredPhotons};
 use crate::render::plan::Plan;
@@ -20,6 +22,8 @@ use std::time::Instant;
 pub const PILOT_PASS: u64 = u64::MAX;
 /// Photons that one thread follows at a time.
 const CHUNK: u64 = 4096;
+/// Photons of these that are followed together.
+const COMPANY: usize = 128;
 
 /// What is needed to trace the photons of a pass.
 pub struct Emitter<'a> {
@@ -74,9 +78,9 @@ impl Emitter<'_> {
     pub fn run(&self, pass: u64, cancelled: &(dyn Fn() -> bool + Sync)) -> PhotonPass {
         let departures = Departures::new(self, pass);
         let chunks = &departures.chunks;
-        let parts = in_turn(chunks.len(), PhotonPass::default, |part, number| {
+        let parts = in_turn(chunks.len(), Default::default, |(part, company): &mut (PhotonPass, Company), number| {
             if !cancelled() {
-                departures.part(chunks[number], part);
+                departures.part(chunks[number], part, company);
             }
             part.taken()
         });
@@ -94,8 +98,9 @@ impl Emitter<'_> {
     /// Traces pass number `pass` and keeps nothing of it: photons emitted, and stored of each kind.
     pub fn count(&self, pass: u64) -> (u64, [u64; 3]) {
         let departures = Departures::new(self, pass);
-        let counts = in_turn(departures.chunks.len(), PhotonPass::default, |part, number| {
-            departures.part(departures.chunks[number], part);
+        let start = <(PhotonPass, Company)>::default;
+        let counts = in_turn(departures.chunks.len(), start, |(part, company), number| {
+            departures.part(departures.chunks[number], part, company);
             let counts = (part.emitted, PhotonKind::ALL.map(|kind| part.stored.of(kind).len() as u64));
             part.clear();
             counts
@@ -236,11 +241,42 @@ impl<'a> Departures<'a> {
     }
 
     /// Adds all photons of a chunk to `part`.
-    fn part(&self, chunk: Chunk, part: &mut PhotonPass) {
+    fn part(&self, chunk: Chunk, part: &mut PhotonPass, company: &mut Company) {
         let flight = self.flight(chunk);
-        for number in self.numbers(chunk) {
-            self.send(&flight, chunk, number, part, &mut Unrecorded);
+        let numbers = self.numbers(chunk);
+        if !self.emitter.intersector.is_large() {
+            for number in numbers {
+                self.send(&flight, chunk, number, part, &mut Unrecorded);
+            }
+            return;
         }
+        let LightShare { power, count, .. } = self.beams[chunk.beam].share;
+        for first in numbers.clone().step_by(COMPANY) {
+            for number in first..(first + COMPANY as u64).min(numbers.end) {
+                let emission = self.emission(&flight, chunk, number);
+                part.emitted += 1;
+                if self.is_followed(&emission) {
+                    part.counts.grazing += u64::from(emission.bounded);
+                    company.photons.push(Underway::new(number, &emission, power));
+                }
+            }
+            let cut_off = |left| part.cut_off += f64::from(mean(left));
+            flight.trace_together(company, count, &mut part.stored, &mut part.counts, cut_off);
+        }
+    }
+
+    /// How a photon leaves its light.
+    fn emission(&self, flight: &Flight, chunk: Chunk, number: u64) -> Emission {
+        let Beam { share, whole, cells, .. } = &self.beams[chunk.beam];
+        let scene = self.emitter.scene;
+        let x = flight.sequence.four(number, 0);
+        let x = cells.map_or(x, |c| c.numbers(x));
+        emit(scene, &scene.lights[share.light], *whole, x)
+    }
+
+    /// Whether it may leave anything.
+    fn is_followed(&self, emission: &Emission) -> bool {
+        self.aim.is_none_or(|a| a.may_meet(emission.origin, emission.direction))
     }
 
     /// Sends one photon off and follows it.
@@ -252,15 +288,12 @@ impl<'a> Departures<'a> {
         part: &mut PhotonPass,
         recorder: &mut impl PhotonRecorder,
     ) -> Emission {
-        let Beam { share, whole, cells, .. } = &self.beams[chunk.beam];
-        let scene = self.emitter.scene;
-        let x = flight.sequence.four(number, 0);
-        let x = cells.map_or(x, |c| c.numbers(x));
-        let emission = emit(scene, &scene.lights[share.light], *whole, x);
+        let LightShare { power, count, .. } = self.beams[chunk.beam].share;
+        let emission = self.emission(flight, chunk, number);
         part.emitted += 1;
-        if self.aim.is_none_or(|a| a.may_meet(emission.origin, emission.direction)) {
+        if self.is_followed(&emission) {
             let (out, counts) = (&mut part.stored, &mut part.counts);
-            let left = flight.trace(number, &emission, share.power, share.count, out, counts, recorder);
+            let left = flight.trace(number, &emission, power, count, out, counts, recorder);
             part.cut_off += f64::from(mean(left));
         }
         emission

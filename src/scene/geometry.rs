@@ -1,6 +1,7 @@
 //! Surfaces as the intersector sees them: indexed triangles and spheres.
 
 use glam::{Vec2, Vec3};
+use prefetch_index::prefetch_index;
 
 /// No shading normal or texture coordinate at a corner.
 pub const NONE: u32 = u32::MAX;
@@ -57,6 +58,22 @@ const HIERARCHY: usize = 240;
 pub const BYTES_PER_VERTEX: usize = 2 * (2 * size_of::<glam::DVec3>()) + 2 * size_of::<Vec3>();
 
 impl Geometry {
+    /// Asks for the memory of primitives that are to be met: those of a large mesh lie anywhere, and what they are made of lies
+    /// elsewhere again.
+    pub fn expect(&self, primitives: impl Iterator<Item = usize> + Clone) {
+        for p in primitives.clone() {
+            prefetch_index(&self.triangles, p);
+            prefetch_index(&self.corner_normals, p);
+            prefetch_index(&self.corner_uvs, p);
+            prefetch_index(&self.triangle_materials, p);
+        }
+        for p in primitives {
+            let (Some(corners), Some(normals)) = (self.triangles.get(p), self.corner_normals.get(p)) else { continue };
+            corners.iter().for_each(|&i| prefetch_index(&self.positions, i as usize));
+            normals.iter().filter(|i| **i != NONE).for_each(|&i| prefetch_index(&self.normals, i as usize));
+        }
+    }
+
     /// Corners of a triangle.
     #[inline]
     pub fn corners(&self, triangle: usize) -> [Vec3; 3] {

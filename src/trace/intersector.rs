@@ -2,7 +2,8 @@
 
 use crate::math::hash::mix;
 use crate::scene::Geometry;
-use crate::trace::traversal::{BoxRay, LeafTest, traverse};
+use crate::trace::abreast::traverse_abreast;
+use crate::trace::traversal::{BoxRay, LeafTest, is_large, traverse};
 use crate::trace::triangle::ShearedRay;
 use glam::{Vec3, Vec3A};
 use obvhs::BvhBuildParams;
@@ -117,15 +118,44 @@ impl Intersector {
     /// The nearest surface along `ray`; of surfaces at the same distance the one of lower index. None for a ray that is
     /// not finite.
     pub fn closest(&self, ray: &Ray) -> Option<Hit> {
-        let ray = &Ray { origin: ray.origin * self.scale, ..*ray };
-        let start = self.start(ray, f32::INFINITY)?;
-        let sheared = ShearedRay::new(ray.origin, ray.direction);
-        let mut closest =
-            Closest { on: self, ray, sheared, start: &start, t: f32::INFINITY, leaf: usize::MAX, weights: [0.0; 2] };
-        traverse(&self.bvh.nodes, &start.traversal, f32::INFINITY, &mut closest);
-        let Closest { t, leaf, weights, .. } = closest;
-        let primitive = *self.primitives.get(leaf)?;
-        t.is_finite().then_some(Hit { t: t / self.scale, primitive, weights })
+        let (ray, start) = self.ready(ray)?;
+        let traversal = start.traversal;
+        let mut closest = Closest::new(self, ray, start, 0);
+        traverse(&self.bvh.nodes, &traversal, f32::INFINITY, &mut closest);
+        closest.hit()
+    }
+
+    /// [`Self::closest`] of each, in `hits`: in a large scene several are on their way at once, and wait for memory together.
+    pub fn closest_of(&self, rays: &[Ray], hits: &mut Vec<Option<Hit>>) {
+        hits.clear();
+        if !self.is_large() {
+            hits.extend(rays.iter().map(|ray| self.closest(ray)));
+            return;
+        }
+        hits.resize(rays.len(), None);
+        let mut number = 0;
+        let next = || {
+            while let Some(ray) = rays.get(number) {
+                number += 1;
+                if let Some((ray, start)) = self.ready(ray) {
+                    return Some((start.traversal, f32::INFINITY, Closest::new(self, ray, start, number - 1)));
+                }
+            }
+            None
+        };
+        traverse_abreast(&self.bvh.nodes, next, |closest| hits[closest.number] = closest.hit());
+    }
+
+    /// Whether rays wait for memory most of their time, so that [`Self::closest_of`] many takes less than each alone.
+    pub fn is_large(&self) -> bool {
+        is_large(&self.bvh.nodes)
+    }
+
+    /// A ray in the scale of the hierarchy; None if it meets nothing.
+    #[inline(always)]
+    fn ready(&self, ray: &Ray) -> Option<(Ray, Start)> {
+        let ray = Ray { origin: ray.origin * self.scale, ..*ray };
+        Some((ray, self.start(&ray, f32::INFINITY)?))
     }
 
     /// Whether anything lies along `ray` before the distance `t_max`, metres.
@@ -204,19 +234,35 @@ impl Start {
 /// The nearest of the surfaces that are met.
 struct Closest<'a> {
     on: &'a Intersector,
-    ray: &'a Ray,
+    ray: Ray,
     sheared: ShearedRay,
-    start: &'a Start,
+    start: Start,
+    /// Number of the ray among those that are asked for together.
+    number: usize,
     t: f32,
     /// Its entry: what it stands for is looked up when it is known, not for each that is met on the way.
     leaf: usize,
     weights: [f32; 2],
 }
 
+impl<'a> Closest<'a> {
+    #[inline(always)]
+    fn new(on: &'a Intersector, ray: Ray, start: Start, number: usize) -> Self {
+        let sheared = ShearedRay::new(ray.origin, ray.direction);
+        Self { on, ray, sheared, start, number, t: f32::INFINITY, leaf: usize::MAX, weights: [0.0; 2] }
+    }
+
+    #[inline(always)]
+    fn hit(&self) -> Option<Hit> {
+        let primitive = *self.on.primitives.get(self.leaf)?;
+        self.t.is_finite().then_some(Hit { t: self.t / self.on.scale, primitive, weights: self.weights })
+    }
+}
+
 impl LeafTest for Closest<'_> {
     #[inline(always)]
     fn test(&mut self, leaf: usize, limit: &mut f32) -> bool {
-        if let Some((t, b, c)) = self.on.leaf(self.ray, &self.sheared, leaf, self.t) {
+        if let Some((t, b, c)) = self.on.leaf(&self.ray, &self.sheared, leaf, self.t) {
             let of = |leaf: usize| self.on.primitives.get(leaf);
             if t < self.t || of(leaf) < of(self.leaf) || self.leaf == usize::MAX {
                 (self.t, self.leaf, self.weights) = (t, leaf, [b, c]);

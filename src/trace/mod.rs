@@ -1,5 +1,6 @@
 //! Rays, ray differentials, the intersector, and direct light by shadow rays.
 
+mod abreast;
 pub mod differential;
 pub mod direct;
 pub mod intersector;

@@ -36,11 +36,17 @@ const LARGE: usize = 1000;
 /// as far as the direction tells.
 #[inline]
 pub fn traverse(nodes: &[CwBvhNode], ray: &BoxRay, limit: f32, test: &mut impl LeafTest) {
-    if nodes.len() > LARGE {
+    if is_large(nodes) {
         dispatch_in_eights(Traversal::<_, true> { nodes, ray, limit, test });
     } else if !nodes.is_empty() {
         dispatch_in_eights(Traversal::<_, false> { nodes, ray, limit, test });
     }
+}
+
+/// Whether it pays to ask for memory early, and to have several rays on their way.
+#[inline]
+pub fn is_large(nodes: &[CwBvhNode]) -> bool {
+    nodes.len() > LARGE
 }
 
 /// `AHEAD`: whether memory is asked for as soon as it is known what will be looked at.
@@ -51,15 +57,53 @@ struct Traversal<'a, T, const AHEAD: bool> {
     test: &'a mut T,
 }
 
-/// Children of a node that are still to be visited: index of the first, and a mask. Its upper 8 bits are the children that
-/// the ray meets, the nearest on top; its lower 8 bits those that are nodes.
-type Group = (u32, u32);
+/// Children of a node that are still to be visited.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Group {
+    /// Index of the first node among them.
+    pub(super) first: u32,
+    /// The upper 8 bits are the children that the ray meets, the nearest on top; the lower 8 bits those that are nodes.
+    pub(super) mask: u32,
+}
 
 const CHILDREN: u32 = 0xff00_0000;
-const PRIMITIVES: u32 = 0x00ff_ffff;
+pub(super) const PRIMITIVES: u32 = 0x00ff_ffff;
 
 /// Groups kept without allocation; a hierarchy over millions of triangles needs a dozen.
-const SHALLOW: usize = 64;
+pub(super) const SHALLOW: usize = 64;
+
+impl Group {
+    /// The root alone.
+    pub(super) const ROOT: Self = Self { first: 0, mask: 1 << 31 };
+
+    /// Whether none is left.
+    #[inline(always)]
+    pub(super) fn is_done(self) -> bool {
+        self.mask & CHILDREN == 0
+    }
+
+    /// The index of the nearest, and the others.
+    #[inline(always)]
+    pub(super) fn nearest(self, octant: u32) -> (usize, Self) {
+        let child = 31 - self.mask.leading_zeros();
+        let index = self.index((child - 24) ^ octant);
+        (index, Self { mask: self.mask & !(1 << child), ..self })
+    }
+
+    /// The index of the node in that slot.
+    #[inline(always)]
+    fn index(self, slot: u32) -> usize {
+        let before = (self.mask & 0xff & !(u32::MAX << slot)).count_ones();
+        (self.first + before) as usize
+    }
+}
+
+/// The octant that a ray goes to, three bits.
+#[inline(always)]
+pub(super) fn octant_of(ray: &BoxRay) -> u32 {
+    let [x, y, z] = ray.inverse.to_array().map(|c| u32::from(c >= 0.0));
+    x << 2 | y << 1 | z
+}
 
 impl<T: LeafTest, const AHEAD: bool> WithSimd for Traversal<'_, T, AHEAD> {
     type Output = ();
@@ -67,36 +111,26 @@ impl<T: LeafTest, const AHEAD: bool> WithSimd for Traversal<'_, T, AHEAD> {
     #[inline(always)]
     fn with_simd<I: Simd>(self, _: I) {
         let Self { nodes, ray, mut limit, test } = self;
-        let octant = ray.inverse.to_array().map(|c| u32::from(c >= 0.0));
-        let octant = octant[0] << 2 | octant[1] << 1 | octant[2];
-        let mut stack = [(0u32, 0u32); SHALLOW];
+        let octant = octant_of(ray);
+        let mut stack = [Group::default(); SHALLOW];
         let mut deeper: Vec<Group> = Vec::new();
         let mut top = 0;
-        let mut group: Group = (0, 1 << 31);
+        let mut group = Group::ROOT;
         loop {
-            let child = 31 - group.1.leading_zeros();
-            let inner = group.1 & 0xff;
-            group.1 &= !(1 << child);
-            let slot = (child - 24) ^ octant;
-            let before = (inner & !(u32::MAX << slot)).count_ones();
-            let node = &nodes[(group.0 + before) as usize];
-            if group.1 & CHILDREN != 0 {
+            let (index, rest) = group.nearest(octant);
+            let node = &nodes[index];
+            if !rest.is_done() {
                 match stack.get_mut(top) {
-                    Some(place) => *place = group,
-                    None => deeper.push(group),
+                    Some(place) => *place = rest,
+                    None => deeper.push(rest),
                 }
                 top += 1;
             }
             let met = boxes_met(node, ray, octant, limit);
-            group = (node.child_base_idx, met & CHILDREN | u32::from(node.imask));
+            group = children_met(node, met);
             let mut primitives = met & PRIMITIVES;
             if AHEAD {
-                expect_children(nodes, node, met, octant);
-                let mut soon = primitives;
-                while soon != 0 {
-                    test.expect((node.primitive_base_idx + soon.trailing_zeros()) as usize);
-                    soon &= soon - 1;
-                }
+                expect(nodes, node, met, octant, test);
             }
             while primitives != 0 {
                 let leaf = node.primitive_base_idx + primitives.trailing_zeros();
@@ -105,7 +139,7 @@ impl<T: LeafTest, const AHEAD: bool> WithSimd for Traversal<'_, T, AHEAD> {
                     return;
                 }
             }
-            if group.1 & CHILDREN == 0 {
+            if group.is_done() {
                 if top == 0 {
                     return;
                 }
@@ -119,26 +153,36 @@ impl<T: LeafTest, const AHEAD: bool> WithSimd for Traversal<'_, T, AHEAD> {
     }
 }
 
-/// Asks for the memory of all nodes among the children that are `met`: while one of them is awaited, so are the others.
+/// The children among those that are `met`.
 #[inline(always)]
-fn expect_children(nodes: &[CwBvhNode], node: &CwBvhNode, met: u32, octant: u32) {
+pub(super) fn children_met(node: &CwBvhNode, met: u32) -> Group {
+    Group { first: node.child_base_idx, mask: met & CHILDREN | u32::from(node.imask) }
+}
+
+/// Asks for the memory of all that is `met` of a node: while one of them is awaited, so are the others.
+#[inline(always)]
+pub(super) fn expect(nodes: &[CwBvhNode], node: &CwBvhNode, met: u32, octant: u32, test: &impl LeafTest) {
     // A node is five of these long, and nearly always lies in two lines of a cache.
     let parts = cast_slice::<CwBvhNode, [u8; 16]>(nodes);
+    let group = children_met(node, met);
     let mut children = met & CHILDREN;
     while children != 0 {
-        let slot = (children.trailing_zeros() - 24) ^ octant;
-        let before = (u32::from(node.imask) & !(u32::MAX << slot)).count_ones();
-        let first = 5 * (node.child_base_idx + before) as usize;
+        let first = 5 * group.index((children.trailing_zeros() - 24) ^ octant);
         prefetch_index(parts, first);
         prefetch_index(parts, first + 4);
         children &= children - 1;
+    }
+    let mut primitives = met & PRIMITIVES;
+    while primitives != 0 {
+        test.expect((node.primitive_base_idx + primitives.trailing_zeros()) as usize);
+        primitives &= primitives - 1;
     }
 }
 
 /// The children of a node whose boxes the ray meets: nodes in the upper 8 bits, in the order of the octant, and the
 /// primitives of leaves in the lower 24.
 #[inline(always)]
-fn boxes_met(node: &CwBvhNode, ray: &BoxRay, octant: u32, limit: f32) -> u32 {
+pub(super) fn boxes_met(node: &CwBvhNode, ray: &BoxRay, octant: u32, limit: f32) -> u32 {
     let extent = Vec3::from_array(node.e.map(|e| f32::from_bits(u32::from(e) << 23)));
     let scale = extent * ray.inverse;
     let start = (node.p - ray.origin) * ray.inverse;

@@ -1,0 +1,128 @@
+//! Many rays through a large hierarchy, several on their way at once.
+//!
+//! Where a hierarchy is larger than the caches a ray waits for memory most of its time. A step of one ray asks for what its next
+//! step looks at, and the others take theirs meanwhile.
+
+use super::traversal::{BoxRay, Group, LeafTest, PRIMITIVES, SHALLOW, boxes_met, children_met, expect, octant_of};
+use crate::math::lanes::dispatch_in_eights;
+use obvhs::cwbvh::node::CwBvhNode;
+use pulp::{Simd, WithSimd};
+
+/// Rays that are on their way at once.
+const ABREAST: usize = 8;
+
+/// Goes the ways of many rays, as [`traverse`](super::traversal::traverse) goes one: `next` gives them with how far boxes are
+/// opened and with what tests their leaves, and `done` is handed that at the end of each, in any order.
+pub fn traverse_abreast<T: LeafTest>(
+    nodes: &[CwBvhNode],
+    next: impl FnMut() -> Option<(BoxRay, f32, T)>,
+    done: impl FnMut(T),
+) {
+    if !nodes.is_empty() {
+        dispatch_in_eights(Abreast { nodes, next, done });
+    }
+}
+
+struct Abreast<'a, N, D> {
+    nodes: &'a [CwBvhNode],
+    next: N,
+    done: D,
+}
+
+impl<T: LeafTest, N: FnMut() -> Option<(BoxRay, f32, T)>, D: FnMut(T)> WithSimd for Abreast<'_, N, D> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<I: Simd>(self, _: I) {
+        let Self { nodes, mut next, mut done } = self;
+        let mut ways: Vec<Way<T>> = Vec::with_capacity(ABREAST);
+        while ways.len() < ABREAST
+            && let Some(ray) = next()
+        {
+            ways.push(Way::new(ray));
+        }
+        let mut at = 0;
+        while let Some(way) = ways.get_mut(at) {
+            if way.step(nodes) {
+                at += 1;
+            } else if let Some(ray) = next() {
+                done(std::mem::replace(way, Way::new(ray)).test);
+                at += 1;
+            } else {
+                done(ways.swap_remove(at).test);
+            }
+            if at >= ways.len() {
+                at = 0;
+            }
+        }
+    }
+}
+
+/// Where a ray is on its way.
+struct Way<T> {
+    ray: BoxRay,
+    octant: u32,
+    limit: f32,
+    test: T,
+    /// What is still to be visited, the nearest last.
+    stack: [Group; SHALLOW],
+    deeper: Vec<Group>,
+    top: usize,
+    group: Group,
+    /// Entries of the last node that are still to be tested: the first, and a mask.
+    primitives: (u32, u32),
+}
+
+impl<T: LeafTest> Way<T> {
+    #[inline(always)]
+    fn new((ray, limit, test): (BoxRay, f32, T)) -> Self {
+        let (stack, deeper) = ([Group::default(); SHALLOW], Vec::new());
+        Self {
+            ray,
+            octant: octant_of(&ray),
+            limit,
+            test,
+            stack,
+            deeper,
+            top: 0,
+            group: Group::ROOT,
+            primitives: (0, 0),
+        }
+    }
+
+    /// Tests the entries of the last node and goes on to the next; false at the end.
+    #[inline(always)]
+    fn step(&mut self, nodes: &[CwBvhNode]) -> bool {
+        let (first, mut primitives) = self.primitives;
+        while primitives != 0 {
+            if self.test.test((first + primitives.trailing_zeros()) as usize, &mut self.limit) {
+                return false;
+            }
+            primitives &= primitives - 1;
+        }
+        if self.group.is_done() {
+            if self.top == 0 {
+                return false;
+            }
+            self.top -= 1;
+            self.group = match self.stack.get(self.top) {
+                Some(place) => *place,
+                None => self.deeper.pop().unwrap_or_default(),
+            };
+        }
+        let (index, rest) = self.group.nearest(self.octant);
+        let node = &nodes[index];
+        if !rest.is_done() {
+            match self.stack.get_mut(self.top) {
+                Some(place) => *place = rest,
+                None => self.deeper.push(rest),
+            }
+            self.top += 1;
+        }
+        let met = boxes_met(node, &self.ray, self.octant, self.limit);
+        self.group = children_met(node, met);
+        self.primitives = (node.primitive_base_idx, met & PRIMITIVES);
+        expect(nodes, node, met, self.octant, &self.test);
+        true
+    }
+}
