@@ -372,3 +372,59 @@ impl PhotonMaps {
         self.all().map(PhotonMap::limited).fold((0, 0), |sum, l| (sum.0 + l.0, sum.1 + l.1))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::photons::spread::DiffuseSpread;
+    use crate::scene::{built_in, open};
+
+    /// In a large scene photons go together; what they leave, and its order, is that of each alone.
+    #[test]
+    fn photons_together_are_each_alone() {
+        let ring = built_in::find("ring").expect("built in").text;
+        let mirror = "kind = \"mirror\"\nreflectance = [1.0, 1.0, 1.0]";
+        let glass = "kind = \"dielectric\"\nior = 1.5\nabsorption = [0.1, 0.5, 1.0]";
+        let text = ring.replace("segments = 256", "segments = 2500").replace(mirror, glass);
+        assert!(text.contains("2500") && text.contains("dielectric"));
+        let folder = tempfile::tempdir().expect("a folder");
+        let file = folder.path().join("glass.toml");
+        std::fs::write(&file, text).expect("written");
+        let scene = open(file.to_str().expect("a path")).expect("opens");
+        let intersector = Intersector::new(&scene.geometry, scene.radius);
+        assert!(intersector.is_large());
+        let path = PathSettings {
+            max_depth: 4,
+            direct: true,
+            caustic: true,
+            global: true,
+            projected: false,
+            differentials: true,
+            spread: DiffuseSpread::default(),
+        };
+        let (scene, intersector) = (&scene, &intersector);
+        let emitter =
+            Emitter { scene, intersector, path, projection: None, sampling: Sampling::Sobol, photons: 9000, seed: 3 };
+        let together = emitter.run(0, &|| false);
+        let departures = Departures::new(&emitter, 0);
+        let mut alone = PhotonPass::default();
+        for &chunk in &departures.chunks {
+            let flight = departures.flight(chunk);
+            let mut part = PhotonPass::default();
+            for number in departures.numbers(chunk) {
+                departures.send(&flight, chunk, number, &mut part, &mut Unrecorded);
+            }
+            alone.emitted += part.emitted;
+            alone.counts += part.counts;
+            alone.cut_off += part.cut_off;
+            alone.stored = StoredPhotons::joined(&[&alone.stored, &part.stored]);
+        }
+        assert_eq!((together.emitted, together.counts), (alone.emitted, alone.counts));
+        assert_eq!(together.cut_off.to_bits(), alone.cut_off.to_bits());
+        assert!(alone.counts.depth > 0 && alone.cut_off > 0.0);
+        for kind in PhotonKind::ALL {
+            let [a, b] = [&together.stored, &alone.stored].map(|stored| format!("{:?}", stored.of(kind)));
+            assert!(a == b && a.len() > 1000, "{kind:?}");
+        }
+    }
+}

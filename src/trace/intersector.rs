@@ -461,6 +461,38 @@ mod tests {
         }
     }
 
+    /// Many at a time are each alone, in a small scene and in one whose rays go abreast: fewer than do so, and more; those
+    /// that miss, and those that are not finite.
+    #[test]
+    fn rays_together_meet_what_each_meets_alone() {
+        let sequence = Sequence::new(Sampling::Random, 9);
+        let mut met = 0;
+        for (triangles, is_large) in [(0, false), (300, false), (20_000, true)] {
+            let g = soup(triangles, 60);
+            let intersector = Intersector::new(&g, 1.0);
+            assert_eq!(intersector.is_large(), is_large);
+            let mut hits = Vec::new();
+            for count in [0u64, 1, 5, 8, 9, 700] {
+                let rays: Vec<Ray> = (0..count)
+                    .map(|i| {
+                        let (x, y) = (sequence.four(i, 0), sequence.four(i, 1));
+                        let origin = Vec3::new(x[0], x[1], x[2]) * 2.0 - 0.5;
+                        let origin = if i % 50 == 7 { Vec3::NAN } else { origin };
+                        Ray { origin, direction: crate::math::frame::uniform_sphere(y[0], y[1]).normalize() }
+                    })
+                    .collect();
+                intersector.closest_of(&rays, &mut hits);
+                assert_eq!(hits.len(), rays.len());
+                for (ray, hit) in rays.iter().zip(&hits) {
+                    let of = |hit: &Hit| (hit.t.to_bits(), hit.primitive, hit.weights.map(f32::to_bits));
+                    assert_eq!(hit.as_ref().map(of), intersector.closest(ray).as_ref().map(of));
+                    met += u32::from(hit.is_some());
+                }
+            }
+        }
+        assert!(met > 100, "{met}");
+    }
+
     #[test]
     fn a_ray_that_is_not_finite_meets_nothing() {
         let intersector = Intersector::new(&soup(10, 0), 1.0);
