@@ -6,6 +6,7 @@
 
 use glam::Vec3;
 use pulp::{Arch, Simd, WithSimd};
+#[cfg(target_arch = "x86_64")]
 use std::any::Any;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 

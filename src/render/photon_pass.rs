@@ -384,7 +384,7 @@ mod tests {
     fn photons_together_are_each_alone() {
         let ring = built_in::find("ring").expect("built in").text;
         let mirror = "kind = \"mirror\"\nreflectance = [1.0, 1.0, 1.0]";
-        let glass = "kind = \"dielectric\"\nior = 1.5\nabsorption = [0.1, 0.5, 1.0]";
+        let glass = "kind = \"dielectric\"\nior = 1.5\ntransmittance = [0.9, 0.6, 0.4]";
         let text = ring.replace("segments = 256", "segments = 2500").replace(mirror, glass);
         assert!(text.contains("2500") && text.contains("dielectric"));
         let folder = tempfile::tempdir().expect("a folder");
