@@ -394,7 +394,7 @@ mod tests {
         let intersector = Intersector::new(&scene.geometry, scene.radius);
         assert!(intersector.is_large());
         let path = PathSettings {
-            max_depth: 4,
+            max_depth: 8,
             direct: true,
             caustic: true,
             global: true,
@@ -424,7 +424,7 @@ mod tests {
         assert!(alone.counts.depth > 0 && alone.cut_off > 0.0);
         for kind in PhotonKind::ALL {
             let [a, b] = [&together.stored, &alone.stored].map(|stored| format!("{:?}", stored.of(kind)));
-            assert!(a == b && a.len() > 1000, "{kind:?}");
+            assert!(a == b && a.len() > 1000, "{kind:?} {}", a.len());
         }
     }
 }
