@@ -84,7 +84,7 @@ fn bounces(g: &Geometry, intersector: &Intersector, count: usize) -> Vec<Ray> {
 
 const RAYS: usize = 100_000;
 /// Rays that are asked for at a time, as the photon pass does.
-const COMPANY: usize = 128;
+const WAVEFRONT: usize = 128;
 
 fn rays() {
     let builders = [("medium", BvhBuildParams::medium_build()), ("very slow", BvhBuildParams::very_slow_build())];
@@ -112,9 +112,9 @@ fn rays() {
                 intersector.closest_of(rays, &mut hits);
                 hits.iter().flatten().count()
             };
-            rays.chunks(COMPANY).map(met).sum()
+            rays.chunks(WAVEFRONT).map(met).sum()
         };
-        in_pairs(&format!("closest, {COMPANY} at a time, {what}"), &rays, each(theirs), together);
+        in_pairs(&format!("closest, {WAVEFRONT} at a time, {what}"), &rays, each(theirs), together);
         let theirs = |r: &Ray| {
             let ray = obvhs::ray::Ray { tmax: 1.0, ..prepared(r) };
             bvh.ray_traverse_miss(ray, |ray, leaf| leaves[leaf].intersect(ray))

@@ -74,7 +74,7 @@ pub struct Flight<'a> {
 
 /// A photon before it meets its next surface.
 #[derive(Clone, Copy, Debug)]
-pub struct Underway {
+pub struct PathState {
     index: u64,
     ray: Ray,
     differential: Differential,
@@ -84,7 +84,7 @@ pub struct Underway {
     medium: Option<u32>,
 }
 
-impl Underway {
+impl PathState {
     /// One that leaves its light with that power, W. `index` names it in the sequence.
     pub fn new(index: u64, emission: &Emission, power: Rgb) -> Self {
         let ray = Ray { origin: emission.origin, direction: emission.direction };
@@ -94,9 +94,9 @@ impl Underway {
 
 /// Photons that are followed together, and what that takes.
 #[derive(Clone, Default)]
-pub struct Company {
+pub struct Wavefront {
     /// Those on their way, in the order of their indices.
-    pub photons: Vec<Underway>,
+    pub photons: Vec<PathState>,
     rays: Vec<Ray>,
     hits: Vec<Option<Hit>>,
     /// What they left, with index and bounce.
@@ -179,7 +179,7 @@ impl Flight<'_> {
         counts: &mut PathCounts,
         recorder: &mut impl PhotonRecorder,
     ) -> Rgb {
-        let mut photon = Underway::new(index, emission, power);
+        let mut photon = PathState::new(index, emission, power);
         let mut store = |kind, photon: Photon| out.of_mut(kind).push(photon.into());
         counts.grazing += u64::from(emission.bounded);
         for bounce in 0..self.settings.max_depth {
@@ -194,19 +194,19 @@ impl Flight<'_> {
         photon.power
     }
 
-    /// [`Self::trace`] of each photon of a company, all to one surface before any goes on to the next: their rays are on their
+    /// [`Self::trace`] of each photon of a wavefront, all to one surface before any goes on to the next: their rays are on their
     /// way together. What is stored is in the same order.
     ///
     /// Calls `cut_off` with the power of each that the bounce limit ended, W.
-    pub fn trace_together(
+    pub fn trace_wavefront(
         &self,
-        company: &mut Company,
+        wavefront: &mut Wavefront,
         count: u64,
         out: &mut StoredPhotons,
         counts: &mut PathCounts,
         mut cut_off: impl FnMut(Rgb),
     ) {
-        let Company { photons, rays, hits, stored } = company;
+        let Wavefront { photons, rays, hits, stored } = wavefront;
         stored.clear();
         for bounce in 0..self.settings.max_depth {
             if photons.is_empty() {
@@ -215,7 +215,7 @@ impl Flight<'_> {
             rays.clear();
             rays.extend(photons.iter().map(|photon| photon.ray));
             self.intersector.closest_of(rays, hits);
-            self.scene.geometry.expect(hits.iter().flatten().map(|hit| hit.primitive as usize));
+            self.scene.geometry.prefetch(hits.iter().flatten().map(|hit| hit.primitive as usize));
             let mut hits = hits.iter();
             photons.retain_mut(|photon| {
                 let Some(hit) = hits.next().and_then(Option::as_ref) else {
@@ -239,7 +239,7 @@ impl Flight<'_> {
     #[inline(always)]
     fn meet(
         &self,
-        photon: &mut Underway,
+        photon: &mut PathState,
         hit: &Hit,
         bounce: u32,
         count: u64,
@@ -248,7 +248,7 @@ impl Flight<'_> {
         recorder: &mut impl PhotonRecorder,
     ) -> bool {
         let scene = self.scene;
-        let Underway { index, mut ray, differential: mut d, mut power, mut kind, mut medium } = *photon;
+        let PathState { index, mut ray, differential: mut d, mut power, mut kind, mut medium } = *photon;
         let material = &scene.materials[scene.geometry.material(hit.primitive as usize)];
         if material.is_diffuse() && !self.keeps(kind) && !self.settings.global {
             // It ends here, and leaves nothing: half of those that pass a specular surface by.
@@ -323,7 +323,7 @@ impl Flight<'_> {
                 }
             }
         }
-        *photon = Underway { index, ray, differential: d, power, kind, medium };
+        *photon = PathState { index, ray, differential: d, power, kind, medium };
         true
     }
 

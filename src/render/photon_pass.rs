@@ -7,7 +7,7 @@ use crate::math::sequence::{Sampling, Sequence};
 use crate::photons::emission::{Emission, LightShare, emit, share_among, share_photons};
 use crate::photons::map::{FootprintLimits, MapParts};
 use crate::photons::path::{
-    Company, Flight, PathCounts, PathSettings, PhotonRecorder, SpecularBounds, Underway, Unrecorded,
+    Flight, PathCounts, PathSettings, PathState, PhotonRecorder, SpecularBounds, Unrecorded, Wavefront,
 };
 use crate::photons::projection::{Cells, ProjectionMap};
 use crate::photons::{PhotonKind, PhotonMap, StoredPhotons};
@@ -23,7 +23,7 @@ pub const PILOT_PASS: u64 = u64::MAX;
 /// Photons that one thread follows at a time.
 const CHUNK: u64 = 4096;
 /// Photons of these that are followed together.
-const COMPANY: usize = 128;
+const WAVEFRONT: usize = 128;
 
 /// What is needed to trace the photons of a pass.
 pub struct Emitter<'a> {
@@ -78,12 +78,13 @@ impl Emitter<'_> {
     pub fn run(&self, pass: u64, cancelled: &(dyn Fn() -> bool + Sync)) -> PhotonPass {
         let departures = Departures::new(self, pass);
         let chunks = &departures.chunks;
-        let parts = in_turn(chunks.len(), Default::default, |(part, company): &mut (PhotonPass, Company), number| {
-            if !cancelled() {
-                departures.part(chunks[number], part, company);
-            }
-            part.taken()
-        });
+        let parts =
+            in_turn(chunks.len(), Default::default, |(part, wavefront): &mut (PhotonPass, Wavefront), number| {
+                if !cancelled() {
+                    departures.part(chunks[number], part, wavefront);
+                }
+                part.taken()
+            });
         let stored = StoredPhotons::joined(&parts.iter().map(|part| &part.stored).collect::<Vec<_>>());
         let mut whole = PhotonPass { stored, ..Default::default() };
         for part in parts {
@@ -98,9 +99,9 @@ impl Emitter<'_> {
     /// Traces pass number `pass` and keeps nothing of it: photons emitted, and stored of each kind.
     pub fn count(&self, pass: u64) -> (u64, [u64; 3]) {
         let departures = Departures::new(self, pass);
-        let start = <(PhotonPass, Company)>::default;
-        let counts = in_turn(departures.chunks.len(), start, |(part, company), number| {
-            departures.part(departures.chunks[number], part, company);
+        let start = <(PhotonPass, Wavefront)>::default;
+        let counts = in_turn(departures.chunks.len(), start, |(part, wavefront), number| {
+            departures.part(departures.chunks[number], part, wavefront);
             let counts = (part.emitted, PhotonKind::ALL.map(|kind| part.stored.of(kind).len() as u64));
             part.clear();
             counts
@@ -241,7 +242,7 @@ impl<'a> Departures<'a> {
     }
 
     /// Adds all photons of a chunk to `part`.
-    fn part(&self, chunk: Chunk, part: &mut PhotonPass, company: &mut Company) {
+    fn part(&self, chunk: Chunk, part: &mut PhotonPass, wavefront: &mut Wavefront) {
         let flight = self.flight(chunk);
         let numbers = self.numbers(chunk);
         if !self.emitter.intersector.is_large() {
@@ -251,17 +252,17 @@ impl<'a> Departures<'a> {
             return;
         }
         let LightShare { power, count, .. } = self.beams[chunk.beam].share;
-        for first in numbers.clone().step_by(COMPANY) {
-            for number in first..(first + COMPANY as u64).min(numbers.end) {
+        for first in numbers.clone().step_by(WAVEFRONT) {
+            for number in first..(first + WAVEFRONT as u64).min(numbers.end) {
                 let emission = self.emission(&flight, chunk, number);
                 part.emitted += 1;
                 if self.is_followed(&emission) {
                     part.counts.grazing += u64::from(emission.bounded);
-                    company.photons.push(Underway::new(number, &emission, power));
+                    wavefront.photons.push(PathState::new(number, &emission, power));
                 }
             }
             let cut_off = |left| part.cut_off += f64::from(mean(left));
-            flight.trace_together(company, count, &mut part.stored, &mut part.counts, cut_off);
+            flight.trace_wavefront(wavefront, count, &mut part.stored, &mut part.counts, cut_off);
         }
     }
 

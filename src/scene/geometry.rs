@@ -60,7 +60,7 @@ pub const BYTES_PER_VERTEX: usize = 2 * (2 * size_of::<glam::DVec3>()) + 2 * siz
 impl Geometry {
     /// Asks for the memory of primitives that are to be met: those of a large mesh lie anywhere, and what they are made of lies
     /// elsewhere again.
-    pub fn expect(&self, primitives: impl Iterator<Item = usize> + Clone) {
+    pub fn prefetch(&self, primitives: impl Iterator<Item = usize> + Clone) {
         for p in primitives.clone() {
             prefetch_index(&self.triangles, p);
             prefetch_index(&self.corner_normals, p);

@@ -2,7 +2,7 @@
 
 use crate::math::hash::mix;
 use crate::scene::Geometry;
-use crate::trace::abreast::traverse_abreast;
+use crate::trace::interleaved::traverse_interleaved;
 use crate::trace::traversal::{BoxRay, LeafTest, is_large, traverse};
 use crate::trace::triangle::ShearedRay;
 use glam::{Vec3, Vec3A};
@@ -143,7 +143,7 @@ impl Intersector {
             }
             None
         };
-        traverse_abreast(&self.bvh.nodes, next, |closest| hits[closest.number] = closest.hit());
+        traverse_interleaved(&self.bvh.nodes, next, |closest| hits[closest.number] = closest.hit());
     }
 
     /// Whether rays wait for memory most of their time, so that [`Self::closest_of`] many takes less than each alone.
@@ -198,7 +198,7 @@ impl Intersector {
 
     /// Asks for the memory of an entry.
     #[inline(always)]
-    fn expect(&self, leaf: usize) {
+    fn prefetch(&self, leaf: usize) {
         prefetch_index(&self.leaves, leaf);
         // Its end lies before the next one's start.
         prefetch_index(&self.leaves, leaf + 1);
@@ -275,8 +275,8 @@ impl LeafTest for Closest<'_> {
     }
 
     #[inline(always)]
-    fn expect(&self, leaf: usize) {
-        self.on.expect(leaf);
+    fn prefetch(&self, leaf: usize) {
+        self.on.prefetch(leaf);
     }
 }
 
@@ -298,8 +298,8 @@ impl LeafTest for Any<'_> {
     }
 
     #[inline(always)]
-    fn expect(&self, leaf: usize) {
-        self.on.expect(leaf);
+    fn prefetch(&self, leaf: usize) {
+        self.on.prefetch(leaf);
     }
 }
 
@@ -461,7 +461,7 @@ mod tests {
         }
     }
 
-    /// Many at a time are each alone, in a small scene and in one whose rays go abreast: fewer than do so, and more; those
+    /// Many at a time are each alone, in a small scene and in one whose rays are interleaved: fewer than are in flight, and more; those
     /// that miss, and those that are not finite.
     #[test]
     fn rays_together_meet_what_each_meets_alone() {

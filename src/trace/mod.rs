@@ -1,8 +1,8 @@
 //! Rays, ray differentials, the intersector, and direct light by shadow rays.
 
-mod abreast;
 pub mod differential;
 pub mod direct;
+mod interleaved;
 pub mod intersector;
 pub mod scatter;
 pub mod surface;

@@ -25,8 +25,8 @@ pub trait LeafTest {
     /// whether to end.
     fn test(&mut self, leaf: usize, limit: &mut f32) -> bool;
 
-    /// Is told that this entry is tested soon.
-    fn expect(&self, leaf: usize);
+    /// Asks for the memory of an entry that is tested soon.
+    fn prefetch(&self, leaf: usize);
 }
 
 /// Nodes from which a hierarchy and its surfaces are more than the nearest cache holds, so that it pays to ask for memory early.
@@ -61,9 +61,9 @@ struct Traversal<'a, T, const AHEAD: bool> {
 #[derive(Clone, Copy, Default)]
 pub(super) struct Group {
     /// Index of the first node among them.
-    pub(super) first: u32,
+    first: u32,
     /// The upper 8 bits are the children that the ray meets, the nearest on top; the lower 8 bits those that are nodes.
-    pub(super) mask: u32,
+    mask: u32,
 }
 
 const CHILDREN: u32 = 0xff00_0000;
@@ -130,7 +130,7 @@ impl<T: LeafTest, const AHEAD: bool> WithSimd for Traversal<'_, T, AHEAD> {
             group = children_met(node, met);
             let mut primitives = met & PRIMITIVES;
             if AHEAD {
-                expect(nodes, node, met, octant, test);
+                prefetch(nodes, node, met, octant, test);
             }
             while primitives != 0 {
                 let leaf = node.primitive_base_idx + primitives.trailing_zeros();
@@ -161,7 +161,7 @@ pub(super) fn children_met(node: &CwBvhNode, met: u32) -> Group {
 
 /// Asks for the memory of all that is `met` of a node: while one of them is awaited, so are the others.
 #[inline(always)]
-pub(super) fn expect(nodes: &[CwBvhNode], node: &CwBvhNode, met: u32, octant: u32, test: &impl LeafTest) {
+pub(super) fn prefetch(nodes: &[CwBvhNode], node: &CwBvhNode, met: u32, octant: u32, test: &impl LeafTest) {
     // A node is five of these long, and nearly always lies in two lines of a cache.
     let parts = cast_slice::<CwBvhNode, [u8; 16]>(nodes);
     let group = children_met(node, met);
@@ -174,7 +174,7 @@ pub(super) fn expect(nodes: &[CwBvhNode], node: &CwBvhNode, met: u32, octant: u3
     }
     let mut primitives = met & PRIMITIVES;
     while primitives != 0 {
-        test.expect((node.primitive_base_idx + primitives.trailing_zeros()) as usize);
+        test.prefetch((node.primitive_base_idx + primitives.trailing_zeros()) as usize);
         primitives &= primitives - 1;
     }
 }

@@ -1,65 +1,65 @@
-//! Many rays through a large hierarchy, several on their way at once.
+//! Many rays through a large hierarchy, several on their state at once.
 //!
 //! Where a hierarchy is larger than the caches a ray waits for memory most of its time. A step of one ray asks for what its next
 //! step looks at, and the others take theirs meanwhile.
 
-use super::traversal::{BoxRay, Group, LeafTest, PRIMITIVES, SHALLOW, boxes_met, children_met, expect, octant_of};
+use super::traversal::{BoxRay, Group, LeafTest, PRIMITIVES, SHALLOW, boxes_met, children_met, octant_of, prefetch};
 use crate::math::lanes::dispatch_in_eights;
 use obvhs::cwbvh::node::CwBvhNode;
 use pulp::{Simd, WithSimd};
 
-/// Rays that are on their way at once.
-const ABREAST: usize = 8;
+/// Rays that are on their state at once.
+const IN_FLIGHT: usize = 8;
 
-/// Goes the ways of many rays, as [`traverse`](super::traversal::traverse) goes one: `next` gives them with how far boxes are
+/// Goes the states of many rays, as [`traverse`](super::traversal::traverse) goes one: `next` gives them with how far boxes are
 /// opened and with what tests their leaves, and `done` is handed that at the end of each, in any order.
-pub fn traverse_abreast<T: LeafTest>(
+pub fn traverse_interleaved<T: LeafTest>(
     nodes: &[CwBvhNode],
     next: impl FnMut() -> Option<(BoxRay, f32, T)>,
     done: impl FnMut(T),
 ) {
     if !nodes.is_empty() {
-        dispatch_in_eights(Abreast { nodes, next, done });
+        dispatch_in_eights(Interleaved { nodes, next, done });
     }
 }
 
-struct Abreast<'a, N, D> {
+struct Interleaved<'a, N, D> {
     nodes: &'a [CwBvhNode],
     next: N,
     done: D,
 }
 
-impl<T: LeafTest, N: FnMut() -> Option<(BoxRay, f32, T)>, D: FnMut(T)> WithSimd for Abreast<'_, N, D> {
+impl<T: LeafTest, N: FnMut() -> Option<(BoxRay, f32, T)>, D: FnMut(T)> WithSimd for Interleaved<'_, N, D> {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<I: Simd>(self, _: I) {
         let Self { nodes, mut next, mut done } = self;
-        let mut ways: Vec<Way<T>> = Vec::with_capacity(ABREAST);
-        while ways.len() < ABREAST
+        let mut states: Vec<TraversalState<T>> = Vec::with_capacity(IN_FLIGHT);
+        while states.len() < IN_FLIGHT
             && let Some(ray) = next()
         {
-            ways.push(Way::new(ray));
+            states.push(TraversalState::new(ray));
         }
         let mut at = 0;
-        while let Some(way) = ways.get_mut(at) {
-            if way.step(nodes) {
+        while let Some(state) = states.get_mut(at) {
+            if state.step(nodes) {
                 at += 1;
             } else if let Some(ray) = next() {
-                done(std::mem::replace(way, Way::new(ray)).test);
+                done(std::mem::replace(state, TraversalState::new(ray)).test);
                 at += 1;
             } else {
-                done(ways.swap_remove(at).test);
+                done(states.swap_remove(at).test);
             }
-            if at >= ways.len() {
+            if at >= states.len() {
                 at = 0;
             }
         }
     }
 }
 
-/// Where a ray is on its way.
-struct Way<T> {
+/// Where a ray is on its state.
+struct TraversalState<T> {
     ray: BoxRay,
     octant: u32,
     limit: f32,
@@ -73,7 +73,7 @@ struct Way<T> {
     primitives: (u32, u32),
 }
 
-impl<T: LeafTest> Way<T> {
+impl<T: LeafTest> TraversalState<T> {
     #[inline(always)]
     fn new((ray, limit, test): (BoxRay, f32, T)) -> Self {
         let (stack, deeper) = ([Group::default(); SHALLOW], Vec::new());
@@ -122,7 +122,7 @@ impl<T: LeafTest> Way<T> {
         let met = boxes_met(node, &self.ray, self.octant, self.limit);
         self.group = children_met(node, met);
         self.primitives = (node.primitive_base_idx, met & PRIMITIVES);
-        expect(nodes, node, met, self.octant, &self.test);
+        prefetch(nodes, node, met, self.octant, &self.test);
         true
     }
 }
