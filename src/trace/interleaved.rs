@@ -1,17 +1,17 @@
-//! Many rays through a large hierarchy, several on their state at once.
+//! Many rays through a large hierarchy, several in flight at once.
 //!
 //! Where a hierarchy is larger than the caches a ray waits for memory most of its time. A step of one ray asks for what its next
 //! step looks at, and the others take theirs meanwhile.
 
-use super::traversal::{BoxRay, Group, LeafTest, PRIMITIVES, SHALLOW, boxes_met, children_met, octant_of, prefetch};
+use super::traversal::{BoxRay, Group, LeafTest, PRIMITIVES, Stack, boxes_met, children_met, octant_of, prefetch};
 use crate::math::lanes::dispatch_in_eights;
 use obvhs::cwbvh::node::CwBvhNode;
 use pulp::{Simd, WithSimd};
 
-/// Rays that are on their state at once.
+/// Rays that are in flight at once.
 const IN_FLIGHT: usize = 8;
 
-/// Goes the states of many rays, as [`traverse`](super::traversal::traverse) goes one: `next` gives them with how far boxes are
+/// Goes the ways of many rays, as [`traverse`](super::traversal::traverse) goes one: `next` gives them with how far boxes are
 /// opened and with what tests their leaves, and `done` is handed that at the end of each, in any order.
 pub fn traverse_interleaved<T: LeafTest>(
     nodes: &[CwBvhNode],
@@ -58,16 +58,13 @@ impl<T: LeafTest, N: FnMut() -> Option<(BoxRay, f32, T)>, D: FnMut(T)> WithSimd 
     }
 }
 
-/// Where a ray is on its state.
+/// How far a ray has come.
 struct TraversalState<T> {
     ray: BoxRay,
     octant: u32,
     limit: f32,
     test: T,
-    /// What is still to be visited, the nearest last.
-    stack: [Group; SHALLOW],
-    deeper: Vec<Group>,
-    top: usize,
+    stack: Stack,
     group: Group,
     /// Entries of the last node that are still to be tested: the first, and a mask.
     primitives: (u32, u32),
@@ -76,18 +73,7 @@ struct TraversalState<T> {
 impl<T: LeafTest> TraversalState<T> {
     #[inline(always)]
     fn new((ray, limit, test): (BoxRay, f32, T)) -> Self {
-        let (stack, deeper) = ([Group::default(); SHALLOW], Vec::new());
-        Self {
-            ray,
-            octant: octant_of(&ray),
-            limit,
-            test,
-            stack,
-            deeper,
-            top: 0,
-            group: Group::ROOT,
-            primitives: (0, 0),
-        }
+        Self { ray, octant: octant_of(&ray), limit, test, stack: Stack::new(), group: Group::ROOT, primitives: (0, 0) }
     }
 
     /// Tests the entries of the last node and goes on to the next; false at the end.
@@ -101,23 +87,13 @@ impl<T: LeafTest> TraversalState<T> {
             primitives &= primitives - 1;
         }
         if self.group.is_done() {
-            if self.top == 0 {
-                return false;
-            }
-            self.top -= 1;
-            self.group = match self.stack.get(self.top) {
-                Some(place) => *place,
-                None => self.deeper.pop().unwrap_or_default(),
-            };
+            let Some(next) = self.stack.pop() else { return false };
+            self.group = next;
         }
         let (index, rest) = self.group.nearest(self.octant);
         let node = &nodes[index];
         if !rest.is_done() {
-            match self.stack.get_mut(self.top) {
-                Some(place) => *place = rest,
-                None => self.deeper.push(rest),
-            }
-            self.top += 1;
+            self.stack.push(rest);
         }
         let met = boxes_met(node, &self.ray, self.octant, self.limit);
         self.group = children_met(node, met);

@@ -461,8 +461,8 @@ mod tests {
         }
     }
 
-    /// Many at a time are each alone, in a small scene and in one whose rays are interleaved: fewer than are in flight, and more; those
-    /// that miss, and those that are not finite.
+    /// Many at a time are each alone, in a small scene and in one whose rays are interleaved: fewer than are in flight, and
+    /// more; those that miss, and those that are not finite.
     #[test]
     fn rays_together_meet_what_each_meets_alone() {
         let sequence = Sequence::new(Sampling::Random, 9);

@@ -70,7 +70,7 @@ const CHILDREN: u32 = 0xff00_0000;
 pub(super) const PRIMITIVES: u32 = 0x00ff_ffff;
 
 /// Groups kept without allocation; a hierarchy over millions of triangles needs a dozen.
-pub(super) const SHALLOW: usize = 64;
+const SHALLOW: usize = 64;
 
 impl Group {
     /// The root alone.
@@ -98,6 +98,38 @@ impl Group {
     }
 }
 
+/// Groups that a ray comes back to, the nearest last.
+pub(super) struct Stack {
+    groups: [Group; SHALLOW],
+    deeper: Vec<Group>,
+    top: usize,
+}
+
+impl Stack {
+    /// An empty one.
+    #[inline(always)]
+    pub(super) fn new() -> Self {
+        Self { groups: [Group::default(); SHALLOW], deeper: Vec::new(), top: 0 }
+    }
+
+    /// Puts a group on top.
+    #[inline(always)]
+    pub(super) fn push(&mut self, group: Group) {
+        match self.groups.get_mut(self.top) {
+            Some(place) => *place = group,
+            None => self.deeper.push(group),
+        }
+        self.top += 1;
+    }
+
+    /// Takes the group on top; None if there is none.
+    #[inline(always)]
+    pub(super) fn pop(&mut self) -> Option<Group> {
+        self.top = self.top.checked_sub(1)?;
+        self.groups.get(self.top).copied().or_else(|| self.deeper.pop())
+    }
+}
+
 /// The octant that a ray goes to, three bits.
 #[inline(always)]
 pub(super) fn octant_of(ray: &BoxRay) -> u32 {
@@ -112,19 +144,13 @@ impl<T: LeafTest, const AHEAD: bool> WithSimd for Traversal<'_, T, AHEAD> {
     fn with_simd<I: Simd>(self, _: I) {
         let Self { nodes, ray, mut limit, test } = self;
         let octant = octant_of(ray);
-        let mut stack = [Group::default(); SHALLOW];
-        let mut deeper: Vec<Group> = Vec::new();
-        let mut top = 0;
+        let mut stack = Stack::new();
         let mut group = Group::ROOT;
         loop {
             let (index, rest) = group.nearest(octant);
             let node = &nodes[index];
             if !rest.is_done() {
-                match stack.get_mut(top) {
-                    Some(place) => *place = rest,
-                    None => deeper.push(rest),
-                }
-                top += 1;
+                stack.push(rest);
             }
             let met = boxes_met(node, ray, octant, limit);
             group = children_met(node, met);
@@ -140,14 +166,8 @@ impl<T: LeafTest, const AHEAD: bool> WithSimd for Traversal<'_, T, AHEAD> {
                 }
             }
             if group.is_done() {
-                if top == 0 {
-                    return;
-                }
-                top -= 1;
-                group = match stack.get(top) {
-                    Some(place) => *place,
-                    None => deeper.pop().unwrap_or_default(),
-                };
+                let Some(next) = stack.pop() else { return };
+                group = next;
             }
         }
     }
