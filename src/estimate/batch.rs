@@ -1,18 +1,13 @@
 //! Photons of one hit after the other as a structure of arrays, whose weights are computed together in lanes.
 
 use super::{Gathered, View};
+use crate::math::eights::{Group, LANES, set, vector};
 use crate::photons::MapPhoton;
 use glam::{DVec3, Vec3};
 use std::ops::Range;
 
 /// Photons whose weights are computed at once.
 pub(super) const BATCH: usize = 64;
-
-/// Those of which the processor takes one for each of its lanes.
-pub(super) const LANES: usize = 8;
-
-/// The same number of each of [`LANES`] parallelograms.
-pub(super) type Lanes = [f32; LANES];
 
 /// Photons with the hits that see them, [`BATCH`] at most, as a structure of arrays.
 pub(super) trait Pairs: Default {
@@ -26,13 +21,7 @@ pub(super) trait Pairs: Default {
     fn clear(&mut self);
 }
 
-/// `V` vectors of each of [`LANES`] pairs, by coordinate.
-pub(super) type Group<const V: usize> = [[Lanes; 3]; V];
-
 /// `V` vectors of each of [`BATCH`] pairs at most, in groups of [`LANES`].
-///
-/// A loop over the lanes of one group has no rest: over a number that only the run knows, compilers keep one for single
-/// pairs, and some go through it with the last of full groups.
 pub(super) struct Vectors<const V: usize> {
     groups: [Group<V>; BATCH / LANES],
     count: usize,
@@ -56,9 +45,7 @@ impl<const V: usize> Vectors<V> {
     pub fn push(&mut self, vectors: [Vec3; V]) {
         if let Some(group) = self.groups.get_mut(self.count / LANES) {
             for (of, v) in group.iter_mut().zip(vectors) {
-                for (of, x) in of.iter_mut().zip(v.to_array()) {
-                    of[self.count % LANES] = x;
-                }
+                set(of, self.count % LANES, v);
             }
             self.count += 1;
         }
@@ -80,12 +67,6 @@ impl<const V: usize> Vectors<V> {
     pub fn at(&self, i: usize) -> [Vec3; V] {
         self.groups[i / LANES].map(|of| vector(&of, i % LANES))
     }
-}
-
-/// The vector of one lane.
-#[inline(always)]
-pub(super) fn vector([x, y, z]: &[Lanes; 3], lane: usize) -> Vec3 {
-    Vec3::new(x[lane], y[lane], z[lane])
 }
 
 /// View footprints in the filter space of a photon each: centres and half-edges.

@@ -7,7 +7,8 @@
 //! Every term is a continuous function of the vertices, so that edges that touch or coincide need no case of their own.
 
 use super::View;
-use crate::estimate::batch::{self, BATCH, Group, LANES, Vectors, vector};
+use crate::estimate::batch::{self, BATCH, Vectors};
+use crate::math::eights::{Group, LANES, vector};
 use crate::estimate::parallelogram::within;
 use crate::photons::MapPhoton;
 use glam::{DVec2, DVec3};

@@ -1,7 +1,8 @@
 //! `multi_sampled`: the kernel averaged over points of the view footprint (Pedersen 2011, eq. 68 to 71).
 
 use super::{Construction, Estimator, Gathered, Lookup, SamplingPoint, View};
-use crate::estimate::batch::{self, BATCH, Group, LANES, Parallelograms, in_filter_space, vector, weight_by_mean};
+use crate::estimate::batch::{self, BATCH, Parallelograms, in_filter_space, weight_by_mean};
+use crate::math::eights::{Group, LANES, vector};
 use crate::estimate::settings::{Spec, SpecError};
 use crate::math::lanes::dispatch_in_eights;
 use crate::photons::MapPhoton;

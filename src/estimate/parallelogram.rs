@@ -5,7 +5,8 @@
 //! compiler makes lanes of it only where all ends up in one function: nothing on the way is a closure or a `map` of an array,
 //! which may stay functions of their own.
 
-use crate::estimate::batch::{BATCH, LANES, Parallelograms, vector};
+use crate::estimate::batch::{BATCH, Parallelograms};
+use crate::math::eights::{LANES, vector};
 use crate::estimate::polygon::{GAUSS, SHORT, THIN};
 use crate::math::angle::angle;
 use glam::{DVec2, DVec3, Vec3};

@@ -70,6 +70,18 @@ impl<S: Simd> Lanes<S> {
         Self { value: self.simd.min_f32s(not_less, self.simd.splat_f32s(1.0)), ..self }
     }
 
+    /// The larger of two numbers; the other one if either is none.
+    #[inline(always)]
+    pub fn larger(self, other: Self) -> Self {
+        Self { value: self.simd.max_f32s(self.value, other.value), ..self }
+    }
+
+    /// The smaller of two numbers; the other one if either is none.
+    #[inline(always)]
+    pub fn smaller(self, other: Self) -> Self {
+        Self { value: self.simd.min_f32s(self.value, other.value), ..self }
+    }
+
     /// Where it is less; nowhere next to what is no number, as below.
     #[inline(always)]
     pub fn less(self, other: Self) -> S::m32s {

@@ -1,6 +1,7 @@
 //! Colour, frames, sampling sequences and deterministic elementary functions.
 
 pub mod angle;
+pub mod eights;
 pub mod elementary;
 pub mod frame;
 pub mod hash;

@@ -1,5 +1,6 @@
 //! Photons: emission, paths, storage, and the maps that look them up.
 
+mod arrivals;
 pub mod ellipsoid;
 pub mod emission;
 pub mod footprint;

@@ -7,7 +7,7 @@ use crate::math::sequence::{Sampling, Sequence};
 use crate::photons::emission::{Emission, LightShare, emit, share_among, share_photons};
 use crate::photons::map::{FootprintLimits, MapParts};
 use crate::photons::path::{
-    Flight, PathCounts, PathSettings, PathState, PhotonRecorder, SpecularBounds, Unrecorded, Wavefront,
+    Flight, Order, PathCounts, PathSettings, PathState, PhotonRecorder, SpecularBounds, Unrecorded, Wavefront,
 };
 use crate::photons::projection::{Cells, ProjectionMap};
 use crate::photons::{PhotonKind, PhotonMap, StoredPhotons};
@@ -245,16 +245,22 @@ impl<'a> Departures<'a> {
     fn part(&self, chunk: Chunk, part: &mut PhotonPass, wavefront: &mut Wavefront) {
         let flight = self.flight(chunk);
         let numbers = self.numbers(chunk);
-        if !self.emitter.intersector.is_large() {
-            for number in numbers {
-                self.send(&flight, chunk, number, part, &mut Unrecorded);
-            }
-            return;
-        }
-        let LightShare { power, count, .. } = self.beams[chunk.beam].share;
-        for first in numbers.clone().step_by(WAVEFRONT) {
-            for number in first..(first + WAVEFRONT as u64).min(numbers.end) {
-                let emission = self.emission(&flight, chunk, number);
+        let LightShare { power, count, light } = self.beams[chunk.beam].share;
+        let Beam { whole, cells, .. } = &self.beams[chunk.beam];
+        let scene = self.emitter.scene;
+        let mut order = Order::default();
+        let mut xs = Vec::new();
+        let wave: usize = std::env::var("WAVE").ok().and_then(|x| x.parse().ok()).unwrap_or(WAVEFRONT);
+        for first in numbers.clone().step_by(wave) {
+            let these = first..(first + wave as u64).min(numbers.end);
+            xs.clear();
+            xs.extend(these.map(|number| flight.sequence.four(number, 0)));
+            let key = |x: &[f32; 4]| (x[0] * 4096.0) as u32;
+            for &i in order.by(xs.iter().map(key)) {
+                let number = first + u64::from(i);
+                let x = xs[i as usize];
+                let x = cells.map_or(x, |c| c.numbers(x));
+                let emission = emit(scene, &scene.lights[light], *whole, x);
                 part.emitted += 1;
                 if self.is_followed(&emission) {
                     part.counts.grazing += u64::from(emission.bounded);
@@ -262,7 +268,7 @@ impl<'a> Departures<'a> {
                 }
             }
             let cut_off = |left| part.cut_off += f64::from(mean(left));
-            flight.trace_wavefront(wavefront, count, &mut part.stored, &mut part.counts, cut_off);
+            flight.trace_wavefront(wavefront, first, count, &mut part.stored, &mut part.counts, cut_off);
         }
     }
 

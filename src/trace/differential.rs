@@ -77,9 +77,11 @@ impl Differential {
     }
 }
 
+/// Longest component of a column that f32 stores.
+pub(crate) const LONGEST: f64 = 1e38;
+
 /// A column as it is stored: one too long for f32 keeps its direction.
 pub(super) fn stored(c: DVec3) -> Vec3 {
-    const LONGEST: f64 = 1e38;
     let longest = c.abs().max_element();
     if longest > LONGEST { (c * (LONGEST / longest)).as_vec3() } else { c.as_vec3() }
 }
@@ -87,8 +89,8 @@ pub(super) fn stored(c: DVec3) -> Vec3 {
 /// A unit vector in f64: the length of one in f32 is wrong by 6·10⁻⁸, which near the critical angle is not little.
 ///
 /// Two of Newton's steps for `1/√x` from 1, each of which squares the error, leave none: no root and no division.
-#[inline]
-pub(super) fn renormalized(v: Vec3) -> DVec3 {
+#[inline(always)]
+pub(crate) fn renormalized(v: Vec3) -> DVec3 {
     let v = v.as_dvec3();
     let x = v.length_squared();
     let y = 1.5 - 0.5 * x;
@@ -96,19 +98,22 @@ pub(super) fn renormalized(v: Vec3) -> DVec3 {
 }
 
 /// One column of `dQ = (I - V Nᵀ/(VᵀN)) (dP + s dV)`.
-fn transfer(v: DVec3, n: DVec3, s: f64, dp: DVec3, dv: DVec3) -> DVec3 {
+#[inline(always)]
+pub(crate) fn transfer(v: DVec3, n: DVec3, s: f64, dp: DVec3, dv: DVec3) -> DVec3 {
     let moved = dp + dv * s;
     moved - v * (n.dot(moved) * per_cosine(v, n))
 }
 
 /// `1/(VᵀN)`, as large as it is, never infinite.
+#[inline(always)]
 fn per_cosine(v: DVec3, n: DVec3) -> f64 {
     let vn = v.dot(n);
     1.0 / vn.abs().max(SMALLEST).copysign(vn)
 }
 
 /// One column of `dW = (I - 2 N Nᵀ) dV - 2 (VᵀN I + N Vᵀ) dN`.
-fn reflect(v: DVec3, n: DVec3, dn: DVec3, dv: DVec3) -> DVec3 {
+#[inline(always)]
+pub(crate) fn reflect(v: DVec3, n: DVec3, dn: DVec3, dv: DVec3) -> DVec3 {
     dv - n * (2.0 * n.dot(dv)) - dn * (2.0 * v.dot(n)) - n * (2.0 * v.dot(dn))
 }
 

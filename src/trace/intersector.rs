@@ -35,11 +35,11 @@ pub struct Hit {
 
 /// A bounding volume hierarchy over a scene's surfaces.
 pub struct Intersector {
-    bvh: CwBvh,
+    pub(super) bvh: CwBvh,
     /// Primitive of each leaf entry.
     primitives: Vec<u32>,
     /// Corners of each leaf entry, in the order in which rays meet them; for a sphere centre and radius.
-    leaves: Vec<[Vec3; 3]>,
+    pub(super) leaves: Vec<[Vec3; 3]>,
     triangle_count: u32,
     /// Whether there is anything but triangles: what is met is looked up for nothing where there is not.
     has_spheres: bool,
@@ -119,6 +119,11 @@ impl Intersector {
     /// not finite.
     pub fn closest(&self, ray: &Ray) -> Option<Hit> {
         let (ray, start) = self.ready(ray)?;
+        self.closest_from(ray, start)
+    }
+
+    #[inline(always)]
+    pub(super) fn closest_from(&self, ray: Ray, start: Start) -> Option<Hit> {
         let traversal = start.traversal;
         let mut closest = Closest::new(self, ray, start, 0);
         traverse(&self.bvh.nodes, &traversal, f32::INFINITY, &mut closest);
@@ -128,11 +133,11 @@ impl Intersector {
     /// [`Self::closest`] of each, in `hits`: in a large scene several are on their way at once, and wait for memory together.
     pub fn closest_of(&self, rays: &[Ray], hits: &mut Vec<Option<Hit>>) {
         hits.clear();
+        hits.resize(rays.len(), None);
         if !self.is_large() {
-            hits.extend(rays.iter().map(|ray| self.closest(ray)));
+            self.closest_in_packets(rays, hits);
             return;
         }
-        hits.resize(rays.len(), None);
         let mut number = 0;
         let next = || {
             while let Some(ray) = rays.get(number) {
@@ -153,7 +158,7 @@ impl Intersector {
 
     /// A ray in the scale of the hierarchy; None if it meets nothing.
     #[inline(always)]
-    fn ready(&self, ray: &Ray) -> Option<(Ray, Start)> {
+    pub(super) fn ready(&self, ray: &Ray) -> Option<(Ray, Start)> {
         let ray = Ray { origin: ray.origin * self.scale, ..*ray };
         Some((ray, self.start(&ray, f32::INFINITY)?))
     }
@@ -206,18 +211,44 @@ impl Intersector {
 
     #[inline(always)]
     fn leaf(&self, ray: &Ray, sheared: &ShearedRay, leaf: usize, t_max: f32) -> Option<(f32, f32, f32)> {
-        let shape = &self.leaves[leaf];
-        if !self.has_spheres || self.primitives[leaf] < self.triangle_count {
-            sheared.intersect(shape, t_max)
+        if self.is_triangle(leaf) {
+            sheared.intersect(&self.leaves[leaf], t_max)
         } else {
-            sphere(ray, shape[0], shape[1].x, t_max).map(|t| (t, 0.0, 0.0))
+            self.sphere(ray, leaf, t_max).map(|t| (t, 0.0, 0.0))
         }
+    }
+
+    /// Whether an entry is a triangle, not a sphere.
+    #[inline(always)]
+    pub(super) fn is_triangle(&self, leaf: usize) -> bool {
+        !self.has_spheres || self.primitives[leaf] < self.triangle_count
+    }
+
+    /// Distance to the sphere of an entry, if it is met before `t_max`.
+    #[inline(always)]
+    pub(super) fn sphere(&self, ray: &Ray, leaf: usize, t_max: f32) -> Option<f32> {
+        let [center, radius, _] = self.leaves[leaf];
+        sphere(ray, center, radius.x, t_max)
+    }
+
+    /// Whether of two surfaces in one place that of the entry `leaf` is met, and not the `other`'s, which may be none.
+    #[inline(always)]
+    pub(super) fn is_before(&self, leaf: usize, other: usize) -> bool {
+        self.primitives.get(other).is_none_or(|other| self.primitives[leaf] < *other)
+    }
+
+    /// What a ray met last: an entry, or none, at the distance `t` of the hierarchy's scale.
+    #[inline(always)]
+    pub(super) fn hit(&self, leaf: usize, t: f32, weights: [f32; 2]) -> Option<Hit> {
+        let primitive = *self.primitives.get(leaf)?;
+        t.is_finite().then_some(Hit { t: t / self.scale, primitive, weights })
     }
 }
 
 /// A ray made ready for the box test.
-struct Start {
-    traversal: BoxRay,
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Start {
+    pub(super) traversal: BoxRay,
     /// By how much its start was moved along it.
     moved: f32,
 }
@@ -225,7 +256,7 @@ struct Start {
 impl Start {
     /// Distance from the moved start at which boxes need no longer be opened for a hit at `t`.
     #[inline]
-    fn before(&self, t: f32) -> f32 {
+    pub(super) fn before(&self, t: f32) -> f32 {
         // A part more than rounding may take from a long way.
         if self.moved > 0.0 { t * (1.0 + 4.0 * f32::EPSILON) - self.moved } else { t }
     }
@@ -254,8 +285,7 @@ impl<'a> Closest<'a> {
 
     #[inline(always)]
     fn hit(&self) -> Option<Hit> {
-        let primitive = *self.on.primitives.get(self.leaf)?;
-        self.t.is_finite().then_some(Hit { t: self.t / self.on.scale, primitive, weights: self.weights })
+        self.on.hit(self.leaf, self.t, self.weights)
     }
 }
 
@@ -263,8 +293,7 @@ impl LeafTest for Closest<'_> {
     #[inline(always)]
     fn test(&mut self, leaf: usize, limit: &mut f32) -> bool {
         if let Some((t, b, c)) = self.on.leaf(&self.ray, &self.sheared, leaf, self.t) {
-            let of = |leaf: usize| self.on.primitives.get(leaf);
-            if t < self.t || of(leaf) < of(self.leaf) || self.leaf == usize::MAX {
+            if t < self.t || self.on.is_before(leaf, self.leaf) {
                 (self.t, self.leaf, self.weights) = (t, leaf, [b, c]);
                 *limit = self.start.before(t);
                 // It is looked up in the end.

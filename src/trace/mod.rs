@@ -3,7 +3,9 @@
 pub mod differential;
 pub mod direct;
 mod interleaved;
+mod grouping;
 pub mod intersector;
+pub mod packet;
 pub mod scatter;
 pub mod surface;
 pub mod traversal;

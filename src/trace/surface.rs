@@ -1,5 +1,6 @@
 //! The surface at a hit: position, normals, and how the shading normal turns over a footprint.
 
+use crate::math::eights::choose;
 use crate::scene::geometry::NONE;
 use crate::scene::{Geometry, Scene};
 use crate::trace::differential::stored;
@@ -38,20 +39,14 @@ impl Surface {
         let index = hit.primitive as usize;
         let mut without_shading = false;
         let (position, outward, shading, uv) = if index < g.triangles.len() {
-            let [a, b, c] = g.corners(index);
-            let [wb, wc] = hit.weights;
-            let normal = flat_normal([a, b, c]);
-            let shading = match interpolated(g, index, hit.weights) {
-                Some(sum) => {
-                    let length = sum.length();
-                    without_shading = length < NO_NORMAL;
-                    let n = if without_shading { normal } else { sum * (1.0 / length) };
-                    if n.dot(normal) < 0.0 { -n } else { n }
-                }
-                None => normal,
+            let corners = g.corners(index);
+            let place = match corner_normals(g, index) {
+                Some(normals) => Place::new(corners, normals, true, hit.weights),
+                None => Place::new(corners, [Vec3::ZERO; 3], false, hit.weights),
             };
+            without_shading = place.without_shading;
             let uv = texture_coordinates(g, index, hit.weights);
-            (a + (b - a) * wb + (c - a) * wc, normal, shading, uv)
+            (place.position, place.outward, place.shading, uv)
         } else {
             let s = g.spheres[index - g.triangles.len()];
             let normal = sphere_normal(ray, s.center.as_dvec3(), f64::from(s.radius), f64::from(hit.t));
@@ -85,29 +80,11 @@ impl Surface {
             let side = if self.front { 1.0 } else { -1.0 };
             return dq.map(|d| stored(d.as_dvec3() * (side / r)));
         }
-        let (Some(n), Some(sum)) = (corner_normals(g, index), interpolated(g, index, self.weights)) else {
+        let Some(normals) = corner_normals(g, index) else {
             return [Vec3::ZERO; 2];
         };
-        let [a, b, c] = g.corners(index);
-        let (a, b, c) = (a.as_dvec3(), b.as_dvec3(), c.as_dvec3());
-        let (na, nb, nc) = (n[0].as_dvec3(), n[1].as_dvec3(), n[2].as_dvec3());
-        let (e1, e2) = (b - a, c - a);
-        let area2 = e1.cross(e2);
-        let scale = area2.length_squared();
-        let length = sum.length();
-        if scale <= 0.0 || length < NO_NORMAL {
-            return [Vec3::ZERO; 2];
-        }
-        let unit = sum / length;
-        let towards = if unit.dot(self.shading.as_dvec3()) < 0.0 { -1.0 } else { 1.0 };
-        dq.map(|d| {
-            let d = d.as_dvec3();
-            // Gradients of the weights of the second and third corner.
-            let db = d.cross(e2).dot(area2) / scale;
-            let dc = e1.cross(d).dot(area2) / scale;
-            let dn: DVec3 = (nb - na) * db + (nc - na) * dc;
-            stored((dn - unit * unit.dot(dn)) * (towards / length))
-        })
+        let turns = Turning::new(g.corners(index), normals, self.weights, self.shading);
+        if turns.is_defined { dq.map(|d| stored(turns.over(d))) } else { [Vec3::ZERO; 2] }
     }
 
     /// Start of a ray that leaves the surface along `direction`, a little off it on that side.
@@ -121,6 +98,75 @@ impl Surface {
     pub fn beside(&self, scene: &Scene, before: bool) -> Vec3 {
         let offset = scene.radius * SELF_INTERSECTION;
         if before { self.position + self.normal * offset } else { self.position - self.normal * offset }
+    }
+}
+
+/// A place on a triangle. Without a branch, so that many are found at once in lanes.
+pub(crate) struct Place {
+    /// Position, metres.
+    pub position: Vec3,
+    /// Unit normal of the flat triangle's front.
+    pub outward: DVec3,
+    /// Unit shading normal on the same side; the flat one where the triangle is not smooth.
+    pub shading: DVec3,
+    /// Whether the normals of a smooth triangle's corners cancel here.
+    pub without_shading: bool,
+}
+
+impl Place {
+    /// The place that `weights` name; `normals` count if the triangle is smooth.
+    #[inline(always)]
+    pub fn new(corners: [Vec3; 3], normals: [Vec3; 3], is_smooth: bool, weights: [f32; 2]) -> Self {
+        let ([a, b, c], [wb, wc]) = (corners, weights);
+        let outward = flat_normal(corners);
+        let sum = interpolated(normals, weights);
+        let length = sum.length();
+        let without_shading = is_smooth & (length < NO_NORMAL);
+        let n = choose(is_smooth & !without_shading, sum * (1.0 / length), outward);
+        let shading = choose(n.dot(outward) < 0.0, -n, n);
+        Self { position: a + (b - a) * wb + (c - a) * wc, outward, shading, without_shading }
+    }
+}
+
+/// How the interpolated normal of a smooth triangle turns. Without a branch, as [`Place`].
+pub(crate) struct Turning {
+    edges: [DVec3; 2],
+    /// Changes of the normal along the edges.
+    along: [DVec3; 2],
+    area2: DVec3,
+    scale: f64,
+    unit: DVec3,
+    per_length: f64,
+    /// Whether it has a derivative: the triangle has an area, and its corners' normals do not cancel.
+    pub is_defined: bool,
+}
+
+impl Turning {
+    /// At the place that `weights` name, where `shading` is the shading normal on the side of interest.
+    #[inline(always)]
+    pub fn new(corners: [Vec3; 3], normals: [Vec3; 3], weights: [f32; 2], shading: Vec3) -> Self {
+        let [a, b, c] = [corners[0].as_dvec3(), corners[1].as_dvec3(), corners[2].as_dvec3()];
+        let [na, nb, nc] = [normals[0].as_dvec3(), normals[1].as_dvec3(), normals[2].as_dvec3()];
+        let edges = [b - a, c - a];
+        let area2 = edges[0].cross(edges[1]);
+        let scale = area2.length_squared();
+        let sum = interpolated(normals, weights);
+        let length = sum.length();
+        let unit = sum / length;
+        let towards = if unit.dot(shading.as_dvec3()) < 0.0 { -1.0 } else { 1.0 };
+        let is_defined = (scale > 0.0) & (length >= NO_NORMAL);
+        Self { edges, along: [nb - na, nc - na], area2, scale, unit, per_length: towards / length, is_defined }
+    }
+
+    /// Change of the unit normal for a change `d` of the position, if [`Self::is_defined`].
+    #[inline(always)]
+    pub fn over(&self, d: Vec3) -> DVec3 {
+        let (d, [e1, e2]) = (d.as_dvec3(), self.edges);
+        // Gradients of the weights of the second and third corner.
+        let db = d.cross(e2).dot(self.area2) / self.scale;
+        let dc = e1.cross(d).dot(self.area2) / self.scale;
+        let dn = self.along[0] * db + self.along[1] * dc;
+        (dn - self.unit * self.unit.dot(dn)) * self.per_length
     }
 }
 
@@ -140,9 +186,12 @@ pub const SELF_INTERSECTION: f32 = 2e-6;
 
 /// Unit normal of a triangle's front; f64 from the corners on, as the edges of a needle are nearly parallel and products
 /// of short ones vanish in f32. The y axis for one without area.
+#[inline(always)]
 pub fn flat_normal(corners: [Vec3; 3]) -> DVec3 {
     let a = corners[0].as_dvec3();
-    (corners[1].as_dvec3() - a).cross(corners[2].as_dvec3() - a).try_normalize().unwrap_or(DVec3::Y)
+    let n = (corners[1].as_dvec3() - a).cross(corners[2].as_dvec3() - a);
+    let per_length = 1.0 / n.length();
+    choose((per_length > 0.0) & (per_length < f64::INFINITY), n * per_length, DVec3::Y)
 }
 
 /// Unit normal of a sphere where a ray meets it near the distance `t`, whose last digits an f32 does not have.
@@ -159,14 +208,15 @@ fn sphere_normal(ray: &Ray, center: DVec3, radius: f64, t: f64) -> DVec3 {
     at.try_normalize().unwrap_or(DVec3::Y)
 }
 
-/// The normal interpolated between a triangle's corners, of any length; None for a flat triangle.
-fn interpolated(g: &Geometry, triangle: usize, weights: [f32; 2]) -> Option<DVec3> {
-    let [na, nb, nc] = corner_normals(g, triangle)?;
+/// The normal interpolated between a triangle's corners, of any length.
+#[inline(always)]
+fn interpolated([na, nb, nc]: [Vec3; 3], weights: [f32; 2]) -> DVec3 {
     let (wb, wc) = (f64::from(weights[0]), f64::from(weights[1]));
-    Some(na.as_dvec3() * (1.0 - wb - wc) + nb.as_dvec3() * wb + nc.as_dvec3() * wc)
+    na.as_dvec3() * (1.0 - wb - wc) + nb.as_dvec3() * wb + nc.as_dvec3() * wc
 }
 
-fn corner_normals(g: &Geometry, triangle: usize) -> Option<[Vec3; 3]> {
+/// Normals of a smooth triangle's corners; None for a flat one.
+pub(crate) fn corner_normals(g: &Geometry, triangle: usize) -> Option<[Vec3; 3]> {
     let [i, j, k] = g.corner_normals[triangle];
     if i == NONE {
         return None;

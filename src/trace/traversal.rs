@@ -11,7 +11,7 @@ use pulp::bytemuck::cast_slice;
 use pulp::{Simd, WithSimd};
 
 /// A ray made ready for the box test.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct BoxRay {
     /// Start.
     pub origin: Vec3,
@@ -85,9 +85,21 @@ impl Group {
     /// The index of the nearest, and the others.
     #[inline(always)]
     pub(super) fn nearest(self, octant: u32) -> (usize, Self) {
-        let child = 31 - self.mask.leading_zeros();
-        let index = self.index((child - 24) ^ octant);
-        (index, Self { mask: self.mask & !(1 << child), ..self })
+        let child = self.child();
+        let index = self.index(child ^ octant);
+        (index, Self { mask: self.mask & !(1 << (child + 24)), ..self })
+    }
+
+    /// The children of a node whose bits are set, in the upper 8.
+    #[inline(always)]
+    pub(super) fn of(node: &CwBvhNode, children: u32) -> Self {
+        Self { first: node.child_base_idx, mask: children | u32::from(node.imask) }
+    }
+
+    /// The place of the nearest in the order of the octant.
+    #[inline(always)]
+    pub(super) fn child(self) -> u32 {
+        7 - self.mask.leading_zeros()
     }
 
     /// The index of the node in that slot.
@@ -99,22 +111,22 @@ impl Group {
 }
 
 /// Groups that a ray comes back to, the nearest last.
-pub(super) struct Stack {
-    groups: [Group; SHALLOW],
-    deeper: Vec<Group>,
+pub(super) struct Stack<G = Group> {
+    groups: [G; SHALLOW],
+    deeper: Vec<G>,
     top: usize,
 }
 
-impl Stack {
+impl<G: Copy + Default> Stack<G> {
     /// An empty one.
     #[inline(always)]
     pub(super) fn new() -> Self {
-        Self { groups: [Group::default(); SHALLOW], deeper: Vec::new(), top: 0 }
+        Self { groups: [G::default(); SHALLOW], deeper: Vec::new(), top: 0 }
     }
 
     /// Puts a group on top.
     #[inline(always)]
-    pub(super) fn push(&mut self, group: Group) {
+    pub(super) fn push(&mut self, group: G) {
         match self.groups.get_mut(self.top) {
             Some(place) => *place = group,
             None => self.deeper.push(group),
@@ -124,7 +136,7 @@ impl Stack {
 
     /// Takes the group on top; None if there is none.
     #[inline(always)]
-    pub(super) fn pop(&mut self) -> Option<Group> {
+    pub(super) fn pop(&mut self) -> Option<G> {
         self.top = self.top.checked_sub(1)?;
         self.groups.get(self.top).copied().or_else(|| self.deeper.pop())
     }
@@ -176,7 +188,7 @@ impl<T: LeafTest, const AHEAD: bool> WithSimd for Traversal<'_, T, AHEAD> {
 /// The children among those that are `met`.
 #[inline(always)]
 pub(super) fn children_met(node: &CwBvhNode, met: u32) -> Group {
-    Group { first: node.child_base_idx, mask: met & CHILDREN | u32::from(node.imask) }
+    Group::of(node, met & CHILDREN)
 }
 
 /// Asks for the memory of all that is `met` of a node: while one of them is awaited, so are the others.

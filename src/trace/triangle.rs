@@ -1,5 +1,7 @@
 //! A watertight ray-triangle test (Woop, Benthin and Wald 2013), in f64.
 
+use crate::trace::intersector::Ray;
+use crate::trace::packet::PACKET;
 use glam::{DVec3, Vec3};
 
 /// A ray sheared so that it runs along its longest axis; made once for each ray.
@@ -17,20 +19,26 @@ pub struct ShearedRay {
     per_length: f64,
 }
 
+/// The two axes across a direction, and the longest along it: right-handed where it goes up.
+#[inline(always)]
+pub fn axes_of(direction: Vec3) -> [usize; 3] {
+    let a = direction.abs();
+    let [x, y, along] = if a.x >= a.y && a.x >= a.z {
+        [1, 2, 0]
+    } else if a.y >= a.z {
+        [2, 0, 1]
+    } else {
+        [0, 1, 2]
+    };
+    if direction[along] < 0.0 { [y, x, along] } else { [x, y, along] }
+}
+
 impl ShearedRay {
     /// Prepares a ray; `direction` must be finite and not zero.
     #[inline]
     pub fn new(origin: Vec3, direction: Vec3) -> Self {
         let d = direction.as_dvec3();
-        let a = direction.abs();
-        let (x, y, along) = if a.x >= a.y && a.x >= a.z {
-            (DVec3::Y, DVec3::Z, DVec3::X)
-        } else if a.y >= a.z {
-            (DVec3::Z, DVec3::X, DVec3::Y)
-        } else {
-            (DVec3::X, DVec3::Y, DVec3::Z)
-        };
-        let (x, y) = if d.dot(along) < 0.0 { (y, x) } else { (x, y) };
+        let [x, y, along] = axes_of(direction).map(|axis| DVec3::AXES[axis]);
         let per_length = 1.0 / d.dot(along);
         let across = [x - along * (d.dot(x) * per_length), y - along * (d.dot(y) * per_length)];
         Self { origin: origin.as_dvec3(), across, along, per_length }
@@ -65,6 +73,93 @@ impl ShearedRay {
         let z = self.along;
         let t = ((u * z.dot(a) + v * z.dot(b) + w * z.dot(c)) * (self.per_length * per_det)) as f32;
         (t > 0.0 && t <= t_max).then_some((t, (v * per_det) as f32, (w * per_det) as f32))
+    }
+}
+
+/// Several rays along one longest axis, sheared as each alone.
+pub struct ShearedRays {
+    /// The two axes across, and the longest.
+    axes: [usize; 3],
+    origin: [[f64; PACKET]; 3],
+    /// What the two coordinates across change by on the way of one along.
+    slope: [[f64; PACKET]; 2],
+    per_length: [f64; PACKET],
+}
+
+/// Which rays meet a triangle, and where.
+pub struct HitLanes {
+    /// The bits of those that do.
+    pub met: u32,
+    /// Distances along the rays.
+    pub t: [f32; PACKET],
+    /// Weights of the second and third corner.
+    pub weights: [[f32; PACKET]; 2],
+}
+
+impl ShearedRays {
+    /// Those of `rays`, all of one octant and one longest axis.
+    #[inline(always)]
+    pub fn new(rays: &[Ray; PACKET]) -> Self {
+        let [x, y, along] = axes_of(rays[0].direction);
+        let zero = [0.0; PACKET];
+        let mut all = Self { axes: [x, y, along], origin: [zero; 3], slope: [zero; 2], per_length: zero };
+        for lane in 0..PACKET {
+            let (origin, direction) = (rays[lane].origin, rays[lane].direction);
+            for (i, axis) in all.axes.iter().enumerate() {
+                all.origin[i][lane] = f64::from(origin[*axis]);
+            }
+            let per_length = 1.0 / f64::from(direction[along]);
+            all.per_length[lane] = per_length;
+            all.slope[0][lane] = f64::from(direction[x]) * per_length;
+            all.slope[1][lane] = f64::from(direction[y]) * per_length;
+        }
+        all
+    }
+
+    /// What [`ShearedRay::intersect`] finds for each of those rays whose bits are set.
+    #[inline(always)]
+    pub fn intersect(&self, corners: &[Vec3; 3], t_max: &[f32; PACKET], rays: u32) -> HitLanes {
+        let [a, b, c] = corners;
+        let [x, y, z] = self.axes;
+        let corners = [[a[x], a[y], a[z]], [b[x], b[y], b[z]], [c[x], c[y], c[z]]].map(|c| c.map(f64::from));
+        let mut hits = HitLanes { met: 0, t: [0.0; PACKET], weights: [[0.0; PACKET]; 2] };
+        let zero = [0.0; PACKET];
+        let (mut us, mut vs, mut ws) = (zero, zero, zero);
+        let mut may = [0u64; PACKET];
+        for i in 0..PACKET {
+            let (ox, oy, oz) = (self.origin[0][i], self.origin[1][i], self.origin[2][i]);
+            let (sx, sy) = (self.slope[0][i], self.slope[1][i]);
+            let [a, b, c] = corners;
+            let (ax, ay) = ((a[0] - ox) - sx * (a[2] - oz), (a[1] - oy) - sy * (a[2] - oz));
+            let (bx, by) = ((b[0] - ox) - sx * (b[2] - oz), (b[1] - oy) - sy * (b[2] - oz));
+            let (cx, cy) = ((c[0] - ox) - sx * (c[2] - oz), (c[1] - oy) - sy * (c[2] - oz));
+            let u = cx * by - cy * bx;
+            let v = ax * cy - ay * cx;
+            let w = bx * ay - by * ax;
+            let misses = ((u < 0.0) | (v < 0.0) | (w < 0.0)) & ((u > 0.0) | (v > 0.0) | (w > 0.0));
+            may[i] = if misses { 0 } else { 1 << i };
+            (us[i], vs[i], ws[i]) = (u, v, w);
+        }
+        let may = may.iter().fold(0, |all, own| all | own) as u32 & rays;
+        if may == 0 {
+            return hits;
+        }
+        let mut met = [0u32; PACKET];
+        for i in 0..PACKET {
+            let (u, v, w) = (us[i], vs[i], ws[i]);
+            let det = u + v + w;
+            let per_det = 1.0 / det;
+            let oz = self.origin[2][i];
+            let [a, b, c] = corners;
+            let along = u * (a[2] - oz) + v * (b[2] - oz) + w * (c[2] - oz);
+            let t = (along * (self.per_length[i] * per_det)) as f32;
+            met[i] = if (det != 0.0) & (t > 0.0) & (t <= t_max[i]) { 1 << i } else { 0 };
+            hits.t[i] = t;
+            hits.weights[0][i] = (v * per_det) as f32;
+            hits.weights[1][i] = (w * per_det) as f32;
+        }
+        hits.met = met.iter().fold(0, |all, own| all | own) & may;
+        hits
     }
 }
 
