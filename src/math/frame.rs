@@ -8,6 +8,7 @@ use std::f32::consts::{PI, TAU};
 ///
 /// Continuous except at a `n.z` just below 0 (Duff et al. 2017). Not at 0 itself: there walls along the axes have their
 /// normals, and rounding must not turn their frames.
+#[inline(always)]
 pub fn tangents(n: Vec3) -> (Vec3, Vec3) {
     let sign = if n.z < -1e-5 { -1.0 } else { 1.0 };
     let a = -1.0 / (sign + n.z);
@@ -25,10 +26,16 @@ pub fn direction(n: Vec3, cos: f32, phi: f32) -> Vec3 {
 
 /// Uniform direction on the unit sphere from two numbers in `[0, 1)`. Density `1/(4π)`.
 pub fn uniform_sphere(u: f32, v: f32) -> Vec3 {
+    let (s, c) = sin_cos(TAU * v);
+    on_sphere(u, s, c)
+}
+
+/// The direction of [`uniform_sphere`] for a number and the sine and cosine of its turn.
+#[inline(always)]
+pub fn on_sphere(u: f32, sin: f32, cos: f32) -> Vec3 {
     let z = 1.0 - 2.0 * u;
     let r = (1.0 - z * z).max(0.0).sqrt();
-    let (s, c) = sin_cos(TAU * v);
-    Vec3::new(r * c, r * s, z)
+    Vec3::new(r * cos, r * sin, z)
 }
 
 /// Cosine-weighted direction about the unit vector `n`. Density `cos θ/π`.

@@ -135,11 +135,13 @@ pub fn cosine_solid_angle(n: f32, cos: f32) -> (f32, bool) {
 }
 
 /// Half-axis of the disc of directions with that solid angle: `π r² = Ω`.
+#[inline(always)]
 pub fn cone_radius(solid_angle: f32) -> f32 {
     (solid_angle / PI).sqrt()
 }
 
-fn cone_differential(direction: Vec3, solid_angle: f32) -> Differential {
+#[inline(always)]
+pub(super) fn cone_differential(direction: Vec3, solid_angle: f32) -> Differential {
     let (t, b) = tangents(direction);
     let r = cone_radius(solid_angle);
     Differential { dp: [Vec3::ZERO; 2], dv: [t * r, b * r] }

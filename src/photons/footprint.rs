@@ -1,6 +1,8 @@
 //! A photon's footprint made ready: its filter transform, area and reach.
 
+use crate::math::eights::{Group, LANES, Row, choose, is_within, set, vector};
 use glam::{DVec2, DVec3, Vec2, Vec3};
+use pulp::{Arch, Simd, WithSimd};
 
 /// The transform from world to filter space, where the photon is the unit disc (Pedersen 2011, eq. 45 corrected), along
 /// the principal axes of its ellipse.
@@ -36,32 +38,135 @@ impl FilterTransform {
     /// that shrank to a line or a point keeps all its power on the smallest ellipse that can be told from it. A column
     /// that is not finite counts as none.
     pub fn new(footprint: [Vec3; 2], normal: Vec3, scale: f32, floor: f32, ceiling: f32) -> Self {
-        let n = normal.as_dvec3();
-        let n = n * (1.0 / n.length());
+        let (n, [a, b]) = (unit(normal), columns(footprint, normal, scale));
+        let principal = Principal::of(a, b, n);
+        let principal = if principal.has_axis { principal } else { principal.or_any_axis(a, b, n) };
+        Self::along(&principal, n, floor, ceiling)
+    }
+
+    /// The same of a group's footprints and normals, in lanes.
+    pub fn of_group(footprints: &Group<3>, scale: f32, floor: f32, ceiling: f32) -> FilterTransforms {
+        Arch::new().dispatch(Transforming { footprints, scale, floor, ceiling })
+    }
+
+    #[inline(always)]
+    fn along(principal: &Principal, n: DVec3, floor: f32, ceiling: f32) -> Self {
         let (floor, ceiling) = (f64::from(floor), f64::from(ceiling));
-        let column = |c: Vec3| {
-            let c = c.as_dvec3() * f64::from(scale);
-            if c.is_finite() { c - n * n.dot(c) } else { DVec3::ZERO }
-        };
-        let principal = Principal::of(column(footprint[0]), column(footprint[1]), n);
-        let (long, short) = (principal.long.clamp(floor, ceiling), principal.short.clamp(floor, ceiling));
-        let axes = [principal.axis, principal.across, n];
-        let rows = [axes[0] * (1.0 / long), axes[1] * (1.0 / short), axes[2] * (1.0 / long)];
-        let half = |i: usize| {
-            let [a, b, c] = [axes[0][i] * long, axes[1][i] * short, axes[2][i] * long];
-            (a * a + b * b + c * c).sqrt() as f32
-        };
+        let (long, short) = (principal.long.max(floor).min(ceiling), principal.short.max(floor).min(ceiling));
+        let (axis, across) = (principal.axis, principal.across);
+        let ends = [axis * long, across * short, n * long];
+        let squares = ends[0] * ends[0] + ends[1] * ends[1] + ends[2] * ends[2];
+        let half_extent = DVec3::new(squares.x.sqrt(), squares.y.sqrt(), squares.z.sqrt()).as_vec3();
         let inverse_area = 1.0 / (std::f64::consts::PI * long * short);
         let largest = f64::from(f32::MAX);
         Self {
-            rows: rows.map(|r| r.as_vec3()),
+            rows: [
+                (axis * (1.0 / long)).as_vec3(),
+                (across * (1.0 / short)).as_vec3(),
+                (n * (1.0 / long)).as_vec3(),
+            ],
             turn: principal.turn.as_vec2(),
             inverse_area: inverse_area.min(largest) as f32,
             reach: long as f32,
-            half_extent: Vec3::new(half(0), half(1), half(2)),
-            floored: principal.short < floor || inverse_area > largest,
+            half_extent,
+            floored: (principal.short < floor) | (inverse_area > largest),
             capped: principal.long > ceiling,
         }
+    }
+}
+
+/// The unit vector along a normal that f32 has rounded.
+#[inline(always)]
+fn unit(normal: Vec3) -> DVec3 {
+    let n = normal.as_dvec3();
+    n * (1.0 / n.length())
+}
+
+/// A footprint's columns times `scale` in the plane of a normal; nothing for one that is not finite.
+#[inline(always)]
+fn columns([a, b]: [Vec3; 2], normal: Vec3, scale: f32) -> [DVec3; 2] {
+    let (n, scale) = (unit(normal), f64::from(scale));
+    let (a, b) = (a.as_dvec3() * scale, b.as_dvec3() * scale);
+    [
+        choose(is_within(a, f64::MAX), a - n * n.dot(a), DVec3::ZERO),
+        choose(is_within(b, f64::MAX), b - n * n.dot(b), DVec3::ZERO),
+    ]
+}
+
+/// The transforms of a group's footprints.
+pub struct FilterTransforms {
+    /// Rows, half-extent; the turn and the reach.
+    vectors: Group<5>,
+    inverse_area: Row,
+    floored: Row,
+    capped: Row,
+    /// Whether it has an axis; those that have none are made alone.
+    usual: Row,
+    alone: [Option<FilterTransform>; LANES],
+}
+
+impl FilterTransforms {
+    /// That of one lane.
+    #[inline(always)]
+    pub fn at(&self, lane: usize) -> FilterTransform {
+        if let Some(alone) = self.alone[lane] {
+            return alone;
+        }
+        let last = vector(&self.vectors[4], lane);
+        FilterTransform {
+            rows: [vector(&self.vectors[0], lane), vector(&self.vectors[1], lane), vector(&self.vectors[2], lane)],
+            half_extent: vector(&self.vectors[3], lane),
+            turn: last.truncate(),
+            reach: last.z,
+            inverse_area: self.inverse_area[lane],
+            floored: self.floored[lane] > 0.0,
+            capped: self.capped[lane] > 0.0,
+        }
+    }
+}
+
+struct Transforming<'a> {
+    footprints: &'a Group<3>,
+    scale: f32,
+    floor: f32,
+    ceiling: f32,
+}
+
+impl WithSimd for Transforming<'_> {
+    type Output = FilterTransforms;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> FilterTransforms {
+        let Self { footprints, scale, floor, ceiling } = self;
+        let row = [0.0; LANES];
+        let (vectors, alone) = ([[row; 3]; 5], [None; LANES]);
+        let mut all = FilterTransforms { vectors, inverse_area: row, floored: row, capped: row, usual: row, alone };
+        for lane in 0..LANES {
+            let (a, b) = (vector(&footprints[0], lane), vector(&footprints[1], lane));
+            let normal = vector(&footprints[2], lane);
+            let (n, [a, b]) = (unit(normal), columns([a, b], normal, scale));
+            let principal = Principal::of(a, b, n);
+            let t = FilterTransform::along(&principal, n, floor, ceiling);
+            for i in 0..3 {
+                set(&mut all.vectors[i], lane, t.rows[i]);
+            }
+            set(&mut all.vectors[3], lane, t.half_extent);
+            set(&mut all.vectors[4], lane, t.turn.extend(t.reach));
+            all.inverse_area[lane] = t.inverse_area;
+            all.floored[lane] = if t.floored { 1.0 } else { 0.0 };
+            all.capped[lane] = if t.capped { 1.0 } else { 0.0 };
+            all.usual[lane] = if principal.has_axis { 1.0 } else { 0.0 };
+        }
+        if all.usual != [1.0; LANES] {
+            for lane in 0..LANES {
+                if all.usual[lane] == 0.0 {
+                    let footprint = [vector(&footprints[0], lane), vector(&footprints[1], lane)];
+                    let normal = vector(&footprints[2], lane);
+                    all.alone[lane] = Some(FilterTransform::new(footprint, normal, scale, floor, ceiling));
+                }
+            }
+        }
+        all
     }
 }
 
@@ -75,9 +180,12 @@ struct Principal {
     across: DVec3,
     /// Cosine and sine of the turn from coordinates along both, over their lengths, to those in the two vectors.
     turn: DVec2,
+    /// Whether `axis`, `across` and `turn` are numbers: a circle has no longest axis, and a point has none at all.
+    has_axis: bool,
 }
 
 impl Principal {
+    #[inline(always)]
     fn of(a: DVec3, b: DVec3, n: DVec3) -> Self {
         let (aa, bb, ab) = (a.length_squared(), b.length_squared(), a.dot(b));
         let half_difference = (aa - bb) / 2.0;
@@ -87,18 +195,25 @@ impl Principal {
         let det = a.cross(b).dot(n);
         let short = if long > 0.0 { det.abs() / long } else { 0.0 };
         // (cos θ, sin θ) of the right singular vector, from the half angle that does not cancel.
-        let (c, s) = if half_difference >= 0.0 { (half_difference + root, ab) } else { (ab, root - half_difference) };
-        let right = DVec2::new(c, s);
-        let (axis, turn) = match (right.try_normalize(), a.try_normalize()) {
-            (Some(right), first) => match (a * right.x + b * right.y).try_normalize() {
-                Some(axis) => (axis, right),
-                None => (first.unwrap_or_else(|| n.any_orthonormal_vector()), DVec2::X),
-            },
-            // A circle has no longest axis; any will do.
-            (None, Some(first)) => (first, DVec2::X),
-            (None, None) => (n.any_orthonormal_vector(), DVec2::X),
-        };
-        Self { long, short, axis, across: n.cross(axis) * 1f64.copysign(det), turn }
+        let is_first = half_difference >= 0.0;
+        let (c, s) = (half_difference + root, root - half_difference);
+        let right = DVec2::new(if is_first { c } else { ab }, if is_first { ab } else { s });
+        let per_length = 1.0 / right.length();
+        let turn = right * per_length;
+        let along = a * turn.x + b * turn.y;
+        let per_axis = 1.0 / along.length();
+        let axis = along * per_axis;
+        let across = n.cross(axis) * 1f64.copysign(det);
+        let has_axis = (per_length > 0.0) & (per_length < f64::INFINITY) & (per_axis > 0.0) & (per_axis < f64::INFINITY);
+        Self { long, short, axis, across, turn, has_axis }
+    }
+
+    /// The same with another axis, for any will do: the first of the two vectors if that has a direction.
+    #[cold]
+    fn or_any_axis(self, a: DVec3, b: DVec3, n: DVec3) -> Self {
+        let axis = a.try_normalize().unwrap_or_else(|| n.any_orthonormal_vector());
+        let across = n.cross(axis) * 1f64.copysign(a.cross(b).dot(n));
+        Self { axis, across, turn: DVec2::X, ..self }
     }
 }
 

@@ -1,5 +1,6 @@
 //! Photon maps: photons made ready for a footprint scale, with the structures that look them up.
 
+use crate::math::eights::set;
 use crate::math::rgb::Rgb;
 use crate::photons::Photon;
 use crate::photons::ellipsoid::meets_unit_ball;
@@ -193,11 +194,18 @@ impl PhotonMap {
             let mut boxes = [(Vec3::ZERO, Vec3::ZERO); LANES];
             let mut bounded = (0, 0);
             let own = LANES.min(count - group * LANES);
-            for (lane, &p) in stored[..own].iter().enumerate() {
-                let p: Photon = p.into();
-                let t = FilterTransform::new(p.footprint, p.normal, scale, floor, ceiling);
+            let stored: [Photon; LANES] = std::array::from_fn(|lane| stored[lane].into());
+            let mut footprints = [[[0.0; LANES]; 3]; 3];
+            for (lane, p) in stored.iter().enumerate() {
+                for (of, v) in footprints.iter_mut().zip([p.footprint[0], p.footprint[1], p.normal]) {
+                    set(of, lane, v);
+                }
+            }
+            let transforms = FilterTransform::of_group(&footprints, scale, floor, ceiling);
+            for (lane, p) in stored[..own].iter().enumerate() {
+                let t = transforms.at(lane);
                 bounded = (bounded.0 + u64::from(t.floored), bounded.1 + u64::from(t.capped));
-                ready[lane] = MapPhoton::new(&p, &t);
+                ready[lane] = MapPhoton::new(p, &t);
                 boxes[lane] = (p.position, t.half_extent);
             }
             // Sums of whole numbers do not depend on the order; most groups have none.

@@ -3,6 +3,7 @@
 mod arrivals;
 pub mod ellipsoid;
 pub mod emission;
+pub mod emission_group;
 pub mod footprint;
 pub mod irradiance;
 pub mod kd_tree;

@@ -1,10 +1,12 @@
 //! The photon pass: all photons of one pass, and the maps made of them.
 
 use crate::estimate::Estimator;
+use crate::math::eights::LANES;
 use crate::math::hash::mix;
 use crate::math::rgb::{Rgb, mean};
 use crate::math::sequence::{Sampling, Sequence};
 use crate::photons::emission::{Emission, LightShare, emit, share_among, share_photons};
+use crate::photons::emission_group::emit_group;
 use crate::photons::map::{FootprintLimits, MapParts};
 use crate::photons::path::{
     Flight, Order, PathCounts, PathSettings, PathState, PhotonRecorder, SpecularBounds, Unrecorded, Wavefront,
@@ -13,7 +15,7 @@ use crate::photons::projection::{Cells, ProjectionMap};
 use crate::photons::{PhotonKind, PhotonMap, StoredPhotons};
 use crate::render::plan::Plan;
 use crate::render::turns::in_turn;
-use crate::scene::Scene;
+use crate::scene::{Light, Scene};
 use crate::trace::Intersector;
 use std::ops::Range;
 use std::time::Instant;
@@ -255,16 +257,22 @@ impl<'a> Departures<'a> {
             let these = first..(first + wave as u64).min(numbers.end);
             xs.clear();
             xs.extend(these.map(|number| flight.sequence.four(number, 0)));
-            let key = |x: &[f32; 4]| (x[0] * 4096.0) as u32;
-            for &i in order.by(xs.iter().map(key)) {
-                let number = first + u64::from(i);
-                let x = xs[i as usize];
-                let x = cells.map_or(x, |c| c.numbers(x));
-                let emission = emit(scene, &scene.lights[light], *whole, x);
-                part.emitted += 1;
-                if self.is_followed(&emission) {
-                    part.counts.grazing += u64::from(emission.bounded);
-                    wavefront.photons.push(PathState::new(number, &emission, power));
+            let sorted = order.by(xs.iter().map(|x| start_number(&scene.lights[light], *cells, x)));
+            for group in sorted.chunks(LANES) {
+                let mut x = [[0.0; LANES]; 4];
+                for (lane, &i) in group.iter().enumerate() {
+                    for (row, number) in x.iter_mut().zip(xs[i as usize]) {
+                        row[lane] = number;
+                    }
+                }
+                let x = cells.map_or(x, |c| c.numbers_of_group(&x));
+                let emissions = emit_group(scene, &scene.lights[light], *whole, &x);
+                part.emitted += group.len() as u64;
+                for (&i, emission) in group.iter().zip(&emissions) {
+                    if self.is_followed(emission) {
+                        part.counts.grazing += u64::from(emission.bounded);
+                        wavefront.photons.push(PathState::new(first + u64::from(i), emission, power));
+                    }
                 }
             }
             let cut_off = |left| part.cut_off += f64::from(mean(left));
@@ -304,6 +312,17 @@ impl<'a> Departures<'a> {
             part.cut_off += f64::from(mean(left));
         }
         emission
+    }
+}
+
+/// Twelve bits, by which photons that leave a light for about the same place are next to each other.
+fn start_number(light: &Light, cells: Option<&Cells>, x: &[f32; 4]) -> u32 {
+    let of = |i: usize, cells: f32| (x[i] * cells) as u32;
+    match light {
+        // The first number chooses the cell, and cells are in order.
+        _ if cells.is_some() => of(0, 4096.0),
+        Light::Quad { .. } | Light::Mesh { .. } => of(2, 8.0) << 9 | of(3, 8.0) << 6 | of(0, 8.0) << 3 | of(1, 8.0),
+        _ => of(0, 64.0) << 6 | of(1, 64.0),
     }
 }
 
