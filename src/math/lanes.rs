@@ -21,6 +21,41 @@ pub fn dispatch_in_eights<K: WithSimd>(kernel: K) -> K::Output {
     Arch::Scalar.dispatch(kernel)
 }
 
+/// What is written for eight lanes of 32 bits, and for more of 64 where the compiler makes lanes of loops.
+pub trait EightLanes {
+    /// Does it; `simd` has eight lanes at most.
+    fn run<S: Simd>(self, simd: S);
+}
+
+/// Runs `kernel` in the widest instructions that the processor has.
+#[inline(always)]
+pub fn dispatch_eight_lanes<K: EightLanes>(kernel: K) {
+    #[cfg(target_arch = "x86_64")]
+    if let Some(v4) = pulp::x86::V4::try_new() {
+        return Simd::vectorize(v4, Within { kernel, simd: *v4 });
+    }
+    #[cfg(target_arch = "x86_64")]
+    if let Some(v3) = pulp::x86::V3::try_new() {
+        return Simd::vectorize(v3, Within { kernel, simd: v3 });
+    }
+    Arch::Scalar.dispatch(Within { kernel, simd: pulp::Scalar });
+}
+
+/// A kernel for eight lanes in instructions that may have more.
+struct Within<K, S> {
+    kernel: K,
+    simd: S,
+}
+
+impl<K: EightLanes, L: Simd> WithSimd for Within<K, L> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        self.kernel.run(self.simd);
+    }
+}
+
 /// A mask as bits, the first lane the lowest.
 #[inline(always)]
 pub fn bits<S: Simd>(simd: S, mask: S::m32s) -> u32 {

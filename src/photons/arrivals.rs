@@ -3,6 +3,9 @@
 //! It is computed as for each alone, to the bit, and without a branch; what is rare is only noticed, and left to the caller.
 
 use crate::math::eights::{Group, LANES, Row, is_within, set, vector};
+use crate::math::rgb::Rgb;
+use crate::photons::StoredPhoton;
+use crate::photons::photon::Encoded;
 use crate::scene::Geometry;
 use crate::trace::differential::{LONGEST, reflect, renormalized, transfer};
 use crate::trace::surface::{Place, Turning, corner_normals};
@@ -75,7 +78,8 @@ impl Arrivals {
 
 /// Photons that have arrived; what is said of a lane holds where it is [`Self::is_usual`].
 pub struct Arrived {
-    /// Position, normal, dP, and where a mirror sends them: direction, dV.
+    /// Of those that a mirror reflects: position, normal, dP, direction, dV. Of others: position, and the numbers of
+    /// [`Encoded`].
     vectors: Group<7>,
     usual: Row,
 }
@@ -99,12 +103,6 @@ impl Arrived {
         vector(&self.vectors[1], lane)
     }
 
-    /// dP in the plane of the surface, metres.
-    #[inline(always)]
-    pub fn footprint(&self, lane: usize) -> [Vec3; 2] {
-        [vector(&self.vectors[2], lane), vector(&self.vectors[3], lane)]
-    }
-
     /// Unit direction in which a mirror sends it.
     #[inline(always)]
     pub fn direction(&self, lane: usize) -> Vec3 {
@@ -114,7 +112,17 @@ impl Arrived {
     /// The differential after a mirror.
     #[inline(always)]
     pub fn differential(&self, lane: usize) -> Differential {
-        Differential { dp: self.footprint(lane), dv: [vector(&self.vectors[5], lane), vector(&self.vectors[6], lane)] }
+        let [.., a, b, _, c, d] = &self.vectors;
+        Differential { dp: [vector(a, lane), vector(b, lane)], dv: [vector(c, lane), vector(d, lane)] }
+    }
+
+    /// What is stored of one that no mirror reflects, with the power `power`, W.
+    #[inline(always)]
+    pub fn stored(&self, lane: usize, power: Rgb) -> StoredPhoton {
+        let [_, a, b, c, ..] = &self.vectors;
+        let (a, b, c) = (vector(a, lane), vector(b, lane), vector(c, lane));
+        let encoded = Encoded { footprint: [a.x, a.y, a.z, b.x], direction: [b.y, b.z], normal: [c.x, c.y] };
+        encoded.at(self.position(lane), power)
     }
 }
 
@@ -157,10 +165,15 @@ impl<const MIRROR: bool> WithSimd for Arrive<'_, MIRROR> {
             usual &= is_within((dv[0] * 2.0).as_dvec3(), f64::from(longest[1]));
             usual &= is_within((dv[1] * 2.0).as_dvec3(), f64::from(longest[1]));
             set(&mut arrived.vectors[0], lane, place.position);
-            set(&mut arrived.vectors[1], lane, normal);
-            set(&mut arrived.vectors[2], lane, dp[0]);
-            set(&mut arrived.vectors[3], lane, dp[1]);
-            if MIRROR {
+            if !MIRROR {
+                let Encoded { footprint: [at, ab, ct, cb], direction, normal } = Encoded::new(v, normal, dp);
+                set(&mut arrived.vectors[1], lane, Vec3::new(at, ab, ct));
+                set(&mut arrived.vectors[2], lane, Vec3::new(cb, direction[0], direction[1]));
+                set(&mut arrived.vectors[3], lane, Vec3::new(normal[0], normal[1], 0.0));
+            } else {
+                set(&mut arrived.vectors[1], lane, normal);
+                set(&mut arrived.vectors[2], lane, dp[0]);
+                set(&mut arrived.vectors[3], lane, dp[1]);
                 let shading = (place.shading * side).as_vec3();
                 let bent = renormalized(shading);
                 let w = unit - bent * (2.0 * unit.dot(bent));

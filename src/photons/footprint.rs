@@ -46,7 +46,17 @@ impl FilterTransform {
 
     /// The same of a group's footprints and normals, in lanes.
     pub fn of_group(footprints: &Group<3>, scale: f32, floor: f32, ceiling: f32) -> FilterTransforms {
-        Arch::new().dispatch(Transforming { footprints, scale, floor, ceiling })
+        let mut all = Arch::new().dispatch(Transforming { footprints, scale, floor, ceiling });
+        if all.usual != [1.0; LANES] {
+            for lane in 0..LANES {
+                if all.usual[lane] == 0.0 {
+                    let footprint = [vector(&footprints[0], lane), vector(&footprints[1], lane)];
+                    let normal = vector(&footprints[2], lane);
+                    all.alone[lane] = Some(Self::new(footprint, normal, scale, floor, ceiling));
+                }
+            }
+        }
+        all
     }
 
     #[inline(always)]
@@ -147,24 +157,16 @@ impl WithSimd for Transforming<'_> {
             let (n, [a, b]) = (unit(normal), columns([a, b], normal, scale));
             let principal = Principal::of(a, b, n);
             let t = FilterTransform::along(&principal, n, floor, ceiling);
-            for i in 0..3 {
-                set(&mut all.vectors[i], lane, t.rows[i]);
-            }
+            let [first, second, off] = t.rows;
+            set(&mut all.vectors[0], lane, first);
+            set(&mut all.vectors[1], lane, second);
+            set(&mut all.vectors[2], lane, off);
             set(&mut all.vectors[3], lane, t.half_extent);
             set(&mut all.vectors[4], lane, t.turn.extend(t.reach));
             all.inverse_area[lane] = t.inverse_area;
             all.floored[lane] = if t.floored { 1.0 } else { 0.0 };
             all.capped[lane] = if t.capped { 1.0 } else { 0.0 };
             all.usual[lane] = if principal.has_axis { 1.0 } else { 0.0 };
-        }
-        if all.usual != [1.0; LANES] {
-            for lane in 0..LANES {
-                if all.usual[lane] == 0.0 {
-                    let footprint = [vector(&footprints[0], lane), vector(&footprints[1], lane)];
-                    let normal = vector(&footprints[2], lane);
-                    all.alone[lane] = Some(FilterTransform::new(footprint, normal, scale, floor, ceiling));
-                }
-            }
         }
         all
     }
@@ -193,7 +195,8 @@ impl Principal {
         let long = ((aa + bb) / 2.0 + root).sqrt();
         // The product of the singular values is the determinant, which does not cancel.
         let det = a.cross(b).dot(n);
-        let short = if long > 0.0 { det.abs() / long } else { 0.0 };
+        let ratio = det.abs() / long;
+        let short = if long > 0.0 { ratio } else { 0.0 };
         // (cos θ, sin θ) of the right singular vector, from the half angle that does not cancel.
         let is_first = half_difference >= 0.0;
         let (c, s) = (half_difference + root, root - half_difference);

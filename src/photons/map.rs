@@ -1,6 +1,6 @@
 //! Photon maps: photons made ready for a footprint scale, with the structures that look them up.
 
-use crate::math::eights::set;
+use crate::math::eights::vector;
 use crate::math::rgb::Rgb;
 use crate::photons::Photon;
 use crate::photons::ellipsoid::meets_unit_ball;
@@ -54,19 +54,6 @@ impl MapPhoton {
         inverse_area: 0.0,
         turn: Vec2::ZERO,
     };
-
-    fn new(p: &Photon, t: &FilterTransform) -> Self {
-        Self {
-            position: p.position,
-            inverse_area: t.inverse_area,
-            rows: [t.rows[0], t.rows[1]],
-            turn: t.turn,
-            inverse_reach: 1.0 / t.reach,
-            power: p.power,
-            normal: p.normal,
-            direction: p.direction,
-        }
-    }
 
     /// Filter coordinates of a world vector.
     #[inline]
@@ -194,19 +181,22 @@ impl PhotonMap {
             let mut boxes = [(Vec3::ZERO, Vec3::ZERO); LANES];
             let mut bounded = (0, 0);
             let own = LANES.min(count - group * LANES);
-            let stored: [Photon; LANES] = std::array::from_fn(|lane| stored[lane].into());
-            let mut footprints = [[[0.0; LANES]; 3]; 3];
-            for (lane, p) in stored.iter().enumerate() {
-                for (of, v) in footprints.iter_mut().zip([p.footprint[0], p.footprint[1], p.normal]) {
-                    set(of, lane, v);
-                }
-            }
-            let transforms = FilterTransform::of_group(&footprints, scale, floor, ceiling);
+            let [a, b, normals, directions] = P::group(&stored);
+            let transforms = FilterTransform::of_group(&[a, b, normals], scale, floor, ceiling);
             for (lane, p) in stored[..own].iter().enumerate() {
                 let t = transforms.at(lane);
                 bounded = (bounded.0 + u64::from(t.floored), bounded.1 + u64::from(t.capped));
-                ready[lane] = MapPhoton::new(p, &t);
-                boxes[lane] = (p.position, t.half_extent);
+                ready[lane] = MapPhoton {
+                    position: p.position(),
+                    inverse_reach: 1.0 / t.reach,
+                    rows: [t.rows[0], t.rows[1]],
+                    normal: vector(&normals, lane),
+                    direction: vector(&directions, lane),
+                    power: p.power(),
+                    inverse_area: t.inverse_area,
+                    turn: t.turn,
+                };
+                boxes[lane] = (p.position(), t.half_extent);
             }
             // Sums of whole numbers do not depend on the order; most groups have none.
             for (sum, own) in [(&floored, bounded.0), (&capped, bounded.1)] {

@@ -387,13 +387,10 @@ impl Flight<'_> {
             let Some(hit) = &hits[number] else { continue };
             let photon = &mut photons[number];
             let local = (photon.index - first) as u32;
-            let mut store = |kind, photon: Photon| stored.push((local, kind, photon.into()));
             if arrived.is_usual(lane) {
-                let (position, normal, footprint) =
-                    (arrived.position(lane), arrived.normal(lane), arrived.footprint(lane));
-                let (direction, power) = (photon.ray.direction, photon.power);
-                store(photon.kind, Photon { position, direction, normal, power, footprint });
+                stored.push((local, photon.kind, arrived.stored(lane, photon.power)));
             } else {
+                let mut store = |kind, photon: Photon| stored.push((local, kind, photon.into()));
                 self.meet(photon, hit, bounce, count, &mut store, counts, &mut Unrecorded);
             }
         }

@@ -1,9 +1,11 @@
 //! Photons as they arrive, and as they are stored.
 
+use crate::math::eights::{Group, LANES, Row, set};
 use crate::math::frame::tangents;
 use crate::math::octahedron::Octahedral;
 use crate::math::rgb::Rgb;
 use glam::Vec3;
+use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 use serde::Serialize;
 use std::ops::Range;
@@ -69,6 +71,21 @@ pub trait Footprinted: Copy + Sync + Into<Photon> {
 
     /// About the longest semi-axis of its footprint at scale 1, metres: from that to √2 of it.
     fn size(&self) -> f32;
+
+    /// Power, W.
+    fn power(&self) -> Rgb;
+
+    /// Footprints (two vectors), normals and directions of a group, as each has them alone.
+    fn group(photons: &[Self; LANES]) -> Group<4> {
+        let mut group = [[[0.0; LANES]; 3]; 4];
+        for (lane, &photon) in photons.iter().enumerate() {
+            let Photon { footprint: [a, b], normal, direction, .. } = photon.into();
+            for (of, v) in group.iter_mut().zip([a, b, normal, direction]) {
+                set(of, lane, v);
+            }
+        }
+        group
+    }
 }
 
 impl Footprinted for Photon {
@@ -80,6 +97,10 @@ impl Footprinted for Photon {
         let [a, b] = self.footprint;
         (a.length_squared() + b.length_squared()).sqrt()
     }
+
+    fn power(&self) -> Rgb {
+        self.power
+    }
 }
 
 impl Footprinted for StoredPhoton {
@@ -90,34 +111,100 @@ impl Footprinted for StoredPhoton {
     fn size(&self) -> f32 {
         self.footprint.iter().map(|x| x * x).sum::<f32>().sqrt()
     }
+
+    fn power(&self) -> Rgb {
+        self.power
+    }
+
+    fn group(photons: &[Self; LANES]) -> Group<4> {
+        let mut encoded = EncodedGroup::default();
+        for (lane, photon) in photons.iter().enumerate() {
+            for (row, x) in encoded.footprint.iter_mut().zip(photon.footprint) {
+                row[lane] = x;
+            }
+            for (row, x) in encoded.steps.iter_mut().zip([photon.normal.to_steps(), photon.direction.to_steps()].as_flattened()) {
+                row[lane] = *x;
+            }
+        }
+        Arch::new().dispatch(encoded)
+    }
+}
+
+/// Footprints, and steps of normals and directions, of a group.
+#[derive(Default)]
+struct EncodedGroup {
+    footprint: [Row; 4],
+    steps: [Row; 4],
+}
+
+impl WithSimd for EncodedGroup {
+    type Output = Group<4>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> Group<4> {
+        let Self { footprint: [at, ab, ct, cb], steps: [nx, ny, dx, dy] } = self;
+        let mut group = [[[0.0; LANES]; 3]; 4];
+        for lane in 0..LANES {
+            let normal = Octahedral::direction_of_steps([nx[lane], ny[lane]]);
+            let [a, b] = decoded(normal, [at[lane], ab[lane], ct[lane], cb[lane]]);
+            set(&mut group[0], lane, a);
+            set(&mut group[1], lane, b);
+            set(&mut group[2], lane, normal);
+            set(&mut group[3], lane, Octahedral::direction_of_steps([dx[lane], dy[lane]]));
+        }
+        group
+    }
+}
+
+/// Directions and footprint of a photon as they are stored. Without a branch, for many at once in lanes.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Encoded {
+    /// As [`StoredPhoton`] has it.
+    pub footprint: [f32; 4],
+    /// Steps on the octahedron.
+    pub direction: [f32; 2],
+    /// Steps on the octahedron.
+    pub normal: [f32; 2],
+}
+
+impl Encoded {
+    #[inline(always)]
+    pub fn new(direction: Vec3, normal: Vec3, [a, c]: [Vec3; 2]) -> Self {
+        let normal = Octahedral::steps(normal);
+        let (t, b) = tangents(Octahedral::direction_of_steps(normal));
+        let footprint = [a.dot(t), a.dot(b), c.dot(t), c.dot(b)];
+        Self { footprint, direction: Octahedral::steps(direction), normal }
+    }
+
+    #[inline(always)]
+    pub fn at(self, position: Vec3, power: Rgb) -> StoredPhoton {
+        let (direction, normal) = (Octahedral::of_steps(self.direction), Octahedral::of_steps(self.normal));
+        StoredPhoton { position, power, footprint: self.footprint, direction, normal }
+    }
 }
 
 impl From<Photon> for StoredPhoton {
     fn from(p: Photon) -> Self {
-        let normal = Octahedral::new(p.normal);
-        let (t, b) = tangents(normal.direction());
-        let [a, c] = p.footprint;
-        Self {
-            position: p.position,
-            power: p.power,
-            footprint: [a.dot(t), a.dot(b), c.dot(t), c.dot(b)],
-            direction: Octahedral::new(p.direction),
-            normal,
-        }
+        Encoded::new(p.direction, p.normal, p.footprint).at(p.position, p.power)
     }
+}
+
+/// Axes of a footprint from coordinates along the tangents of a normal.
+#[inline(always)]
+fn decoded(normal: Vec3, [at, ab, ct, cb]: [f32; 4]) -> [Vec3; 2] {
+    let (t, b) = tangents(normal);
+    [t * at + b * ab, t * ct + b * cb]
 }
 
 impl From<StoredPhoton> for Photon {
     fn from(p: StoredPhoton) -> Self {
         let normal = p.normal.direction();
-        let (t, b) = tangents(normal);
-        let [at, ab, ct, cb] = p.footprint;
         Self {
             position: p.position,
             direction: p.direction.direction(),
             normal,
             power: p.power,
-            footprint: [t * at + b * ab, t * ct + b * cb],
+            footprint: decoded(normal, p.footprint),
         }
     }
 }

@@ -3,6 +3,7 @@
 use crate::math::hash::mix;
 use crate::scene::Geometry;
 use crate::trace::interleaved::traverse_interleaved;
+use crate::trace::packet::inverse_of;
 use crate::trace::traversal::{BoxRay, LeafTest, is_large, traverse};
 use crate::trace::triangle::ShearedRay;
 use glam::{Vec3, Vec3A};
@@ -44,7 +45,7 @@ pub struct Intersector {
     /// Whether there is anything but triangles: what is met is looked up for nothing where there is not.
     has_spheres: bool,
     /// Power of two by which coordinates are multiplied inside; see [`SCALED_RADIUS`].
-    scale: f32,
+    pub(super) scale: f32,
 }
 
 /// Radius to which a scene is scaled inside the intersector, up to a factor of two.
@@ -65,11 +66,11 @@ const WIDEST: f32 = 1.0 / 1024.0;
 
 /// Distance from the local origin, in scaled units, beyond which a ray's start is moved along it for the box test:
 /// farther away rounding would be more than the padding.
-const FAR: f32 = 4.0 * SCALED_RADIUS;
+pub(super) const FAR: f32 = 4.0 * SCALED_RADIUS;
 
 /// Smallest component of a direction that the box test tells from none: at [`FAR`] it moves a ray by nothing, and its
 /// inverse times a coordinate is no infinity.
-const SMALLEST_COMPONENT: f32 = 1e-20;
+pub(super) const SMALLEST_COMPONENT: f32 = 1e-20;
 
 impl Intersector {
     /// Builds over all of `geometry`; `radius` is the scene's.
@@ -119,11 +120,6 @@ impl Intersector {
     /// not finite.
     pub fn closest(&self, ray: &Ray) -> Option<Hit> {
         let (ray, start) = self.ready(ray)?;
-        self.closest_from(ray, start)
-    }
-
-    #[inline(always)]
-    pub(super) fn closest_from(&self, ray: Ray, start: Start) -> Option<Hit> {
         let traversal = start.traversal;
         let mut closest = Closest::new(self, ray, start, 0);
         traverse(&self.bvh.nodes, &traversal, f32::INFINITY, &mut closest);
@@ -158,7 +154,7 @@ impl Intersector {
 
     /// A ray in the scale of the hierarchy; None if it meets nothing.
     #[inline(always)]
-    pub(super) fn ready(&self, ray: &Ray) -> Option<(Ray, Start)> {
+    fn ready(&self, ray: &Ray) -> Option<(Ray, Start)> {
         let ray = Ray { origin: ray.origin * self.scale, ..*ray };
         Some((ray, self.start(&ray, f32::INFINITY)?))
     }
@@ -178,12 +174,7 @@ impl Intersector {
 
     #[inline(always)]
     fn start(&self, ray: &Ray, t_max: f32) -> Option<Start> {
-        // The sum is no number, or infinite, if a part of it is.
-        let sound = (ray.origin + ray.direction).is_finite()
-            && ray.direction != Vec3::ZERO
-            && t_max > 0.0
-            && !self.primitives.is_empty();
-        if !sound {
+        if !self.is_sound(ray) || t_max <= 0.0 {
             return None;
         }
         let (mut origin, mut moved) = (ray.origin, 0.0);
@@ -195,10 +186,14 @@ impl Intersector {
                 moved = along as f32;
             }
         }
-        // A zero has no sign.
-        let direction = ray.direction + Vec3::ZERO;
-        let inverse = direction.abs().max(Vec3::splat(SMALLEST_COMPONENT)).copysign(direction).recip();
-        Some(Start { traversal: BoxRay { origin, inverse }, moved })
+        Some(Start { traversal: BoxRay { origin, inverse: inverse_of(ray.direction) }, moved })
+    }
+
+    /// Whether a ray may meet anything: it is finite, and there is something.
+    #[inline(always)]
+    pub(super) fn is_sound(&self, ray: &Ray) -> bool {
+        // The sum is no number, or infinite, if a part of it is.
+        (ray.origin + ray.direction).is_finite() && ray.direction != Vec3::ZERO && !self.primitives.is_empty()
     }
 
     /// Asks for the memory of an entry.
@@ -246,9 +241,8 @@ impl Intersector {
 }
 
 /// A ray made ready for the box test.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Start {
-    pub(super) traversal: BoxRay,
+struct Start {
+    traversal: BoxRay,
     /// By how much its start was moved along it.
     moved: f32,
 }
@@ -256,7 +250,7 @@ pub(super) struct Start {
 impl Start {
     /// Distance from the moved start at which boxes need no longer be opened for a hit at `t`.
     #[inline]
-    pub(super) fn before(&self, t: f32) -> f32 {
+    fn before(&self, t: f32) -> f32 {
         // A part more than rounding may take from a long way.
         if self.moved > 0.0 { t * (1.0 + 4.0 * f32::EPSILON) - self.moved } else { t }
     }

@@ -1,58 +1,104 @@
-//! Eight rays of one octant through a hierarchy together.
+//! Eight rays that go about the same way through a hierarchy together.
 //!
 //! A node is looked up once for all of them, and each of its boxes is tested by all at once, in lanes. Each ray visits the nodes
-//! that it visits alone, in the same order.
+//! that it visits alone.
 
-use super::traversal::{BoxRay, Group, Stack};
-use crate::math::eights::{LANES, Row, set};
-use crate::math::lanes::{Lanes, Vec3Lanes, bits, dispatch_in_eights};
+use super::intersector::{Ray, SMALLEST_COMPONENT};
+use super::traversal::{Group, Stack};
+use crate::math::eights::{LANES, Row, set, vector};
+use crate::math::lanes::{EightLanes, Lanes, Vec3Lanes, bits, dispatch_eight_lanes};
+use glam::Vec3;
 use obvhs::cwbvh::node::CwBvhNode;
-use pulp::{Simd, WithSimd};
+use pulp::Simd;
 
 /// Rays of a packet.
 pub const PACKET: usize = LANES;
 
-/// Rays of one octant, made ready for the box test.
+/// Rays of one octant and one longest axis.
 #[derive(Clone, Copy)]
-pub struct BoxRays {
-    origin: [Row; 3],
-    inverse: [Row; 3],
-    octant: u32,
+pub struct Packet {
+    /// Starts.
+    pub origin: [Row; 3],
+    /// Directions.
+    pub direction: [Row; 3],
+    /// The octant that they go to, as [`octant_of`](super::traversal::octant_of) has it.
+    pub octant: u32,
+    count: usize,
 }
 
-impl BoxRays {
-    /// None yet, of that octant.
+impl Packet {
+    /// None yet.
     pub fn new(octant: u32) -> Self {
-        Self { origin: [[0.0; PACKET]; 3], inverse: [[0.0; PACKET]; 3], octant }
+        let zero = [[0.0; PACKET]; 3];
+        Self { origin: zero, direction: zero, octant, count: 0 }
     }
 
-    /// Puts one in a lane.
+    /// Adds a ray to less than eight, and says in which lane.
     #[inline(always)]
-    pub fn set(&mut self, lane: usize, ray: &BoxRay) {
+    pub fn push(&mut self, ray: &Ray) -> usize {
+        let lane = self.count % PACKET;
         set(&mut self.origin, lane, ray.origin);
-        set(&mut self.inverse, lane, ray.inverse);
+        set(&mut self.direction, lane, ray.direction);
+        self.count = lane + 1;
+        lane
     }
+
+    /// Number of rays.
+    #[inline(always)]
+    pub fn len(&self) -> usize {
+        self.count
+    }
+
+    /// Forgets them. What is in a lane that holds no ray is traced for nobody.
+    #[inline(always)]
+    pub fn clear(&mut self) {
+        self.count = 0;
+    }
+
+    /// One of them.
+    #[inline(always)]
+    pub fn ray(&self, lane: usize) -> Ray {
+        Ray { origin: vector(&self.origin, lane), direction: vector(&self.direction, lane) }
+    }
+
+    /// One over the components of the directions, as each ray has it alone.
+    #[inline(always)]
+    fn inverse(&self) -> [Row; 3] {
+        let mut inverse = [[0.0; PACKET]; 3];
+        for lane in 0..PACKET {
+            set(&mut inverse, lane, inverse_of(vector(&self.direction, lane)));
+        }
+        inverse
+    }
+}
+
+/// One over each component of a direction, finite; a zero has no sign.
+#[inline(always)]
+pub fn inverse_of(direction: Vec3) -> Vec3 {
+    let direction = direction + Vec3::ZERO;
+    direction.abs().max(Vec3::splat(SMALLEST_COMPONENT)).copysign(direction).recip()
 }
 
 /// What is done with the primitives of leaves.
 pub trait PacketTest {
+    /// Makes it ready for the rays of a packet.
+    fn start(&mut self, packet: &Packet);
+
     /// Tests the entry `leaf` of the hierarchy's primitives for those rays whose bits are set in `rays`; `limits` is how far
     /// boxes are opened for each ray, which it may lower.
-    fn test(&mut self, leaf: usize, rays: u32, limits: &mut [f32; PACKET]);
+    fn test(&mut self, leaf: usize, rays: u32, limits: &mut Row);
 }
 
-/// Hands `test` what [`traverse`](super::traversal::traverse) would for each of the rays whose bits are set in `active`, in the
-/// same order, without a limit at first.
-pub fn traverse_packet(nodes: &[CwBvhNode], rays: &BoxRays, active: u32, test: &mut impl PacketTest) {
+/// Hands `test` what [`traverse`](super::traversal::traverse) would for each ray of a packet, without a limit at first.
+pub fn traverse_packet(nodes: &[CwBvhNode], packet: &Packet, test: &mut impl PacketTest) {
     if !nodes.is_empty() {
-        dispatch_in_eights(PacketTraversal { nodes, rays, active, test });
+        dispatch_eight_lanes(PacketTraversal { nodes, packet, test });
     }
 }
 
 struct PacketTraversal<'a, T> {
     nodes: &'a [CwBvhNode],
-    rays: &'a BoxRays,
-    active: u32,
+    packet: &'a Packet,
     test: &'a mut T,
 }
 
@@ -64,51 +110,49 @@ struct Shared {
     rays: [u8; 8],
 }
 
-impl<T: PacketTest> WithSimd for PacketTraversal<'_, T> {
-    type Output = ();
-
+impl<T: PacketTest> EightLanes for PacketTraversal<'_, T> {
     #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) {
-        let Self { nodes, rays, active, test } = self;
+    fn run<S: Simd>(self, simd: S) {
+        let Self { nodes, packet, test } = self;
+        let octant = packet.octant;
+        let inverse = packet.inverse();
+        test.start(packet);
         let mut limits = [f32::INFINITY; PACKET];
         let mut stack = Stack::new();
-        let mut shared = Shared { group: Group::ROOT, rays: [active as u8; 8] };
+        let active = u8::MAX >> (PACKET - packet.count);
+        let mut shared = Shared { group: Group::ROOT, rays: [active; 8] };
         loop {
-            let (index, rest) = shared.group.nearest(rays.octant);
-            let own = u32::from(shared.rays[shared.group.child() as usize]);
+            let (index, rest) = shared.group.nearest(octant);
+            let own = shared.rays[shared.group.child() as usize];
             let node = &nodes[index];
             if !rest.is_done() {
                 stack.push(Shared { group: rest, ..shared });
             }
-            let met = met_by(simd, node, rays, &limits);
+            let mut met = met_by(simd, node, packet, &inverse, &limits);
+            let mut by_any = 0;
+            for slot in 0..8 {
+                met[slot] &= own;
+                by_any |= u32::from(met[slot] != 0) << slot;
+            }
             let mut children = 0;
-            let mut primitives = 0;
-            let mut by_primitive = [0; 24];
-            shared.rays = [0; 8];
-            for (slot, met) in met.iter().enumerate() {
-                let met = met & own;
-                let meta = u32::from(node.child_meta[slot]);
-                if met == 0 || meta == 0 {
-                    continue;
-                }
-                if meta & 0x18 == 0x18 {
-                    let child = (meta ^ rays.octant) & 31;
-                    children |= 1 << child;
-                    shared.rays[child as usize - 24] = met as u8;
-                } else {
-                    let mut of_leaf = (meta >> 5) << (meta & 31);
-                    primitives |= of_leaf;
-                    while of_leaf != 0 {
-                        by_primitive[of_leaf.trailing_zeros() as usize] = met;
-                        of_leaf &= of_leaf - 1;
-                    }
-                }
+            let mut inner = by_any & u32::from(node.imask);
+            while inner != 0 {
+                let slot = inner.trailing_zeros();
+                inner &= inner - 1;
+                children |= 1 << (24 + (slot ^ octant));
+                shared.rays[(slot ^ octant) as usize] = met[slot as usize];
             }
             shared.group = Group::of(node, children);
-            while primitives != 0 {
-                let place = primitives.trailing_zeros();
-                primitives &= primitives - 1;
-                test.test((node.primitive_base_idx + place) as usize, by_primitive[place as usize], &mut limits);
+            let mut leaves = by_any & !u32::from(node.imask);
+            while leaves != 0 {
+                let slot = leaves.trailing_zeros() as usize;
+                leaves &= leaves - 1;
+                // As many bits as there are primitives, and where the first of them is.
+                let meta = u32::from(node.child_meta[slot]);
+                let first = node.primitive_base_idx + (meta & 31);
+                for leaf in first..first + (meta >> 5).count_ones() {
+                    test.test(leaf as usize, u32::from(met[slot]), &mut limits);
+                }
             }
             if shared.group.is_done() {
                 let Some(next) = stack.pop() else { return };
@@ -120,13 +164,12 @@ impl<T: PacketTest> WithSimd for PacketTraversal<'_, T> {
 
 /// For each child of a node the rays that meet its box within their limits, as bits.
 #[inline(always)]
-fn met_by<S: Simd>(simd: S, node: &CwBvhNode, rays: &BoxRays, limits: &[f32; PACKET]) -> [u32; 8] {
-    let mut all = [0; 8];
+fn met_by<S: Simd>(simd: S, node: &CwBvhNode, packet: &Packet, inverse: &[Row; 3], limits: &Row) -> [u8; 8] {
     let low = [&node.child_min_x, &node.child_min_y, &node.child_min_z];
     let high = [&node.child_max_x, &node.child_max_y, &node.child_max_z];
     let (mut near, mut far) = ([[0.0f32; 8]; 3], [[0.0f32; 8]; 3]);
     for axis in 0..3 {
-        let goes_up = rays.octant >> (2 - axis) & 1 == 1;
+        let goes_up = packet.octant >> (2 - axis) & 1 == 1;
         let (from, to) = if goes_up { (low[axis], high[axis]) } else { (high[axis], low[axis]) };
         for slot in 0..8 {
             near[axis][slot] = f32::from(from[slot]);
@@ -135,27 +178,52 @@ fn met_by<S: Simd>(simd: S, node: &CwBvhNode, rays: &BoxRays, limits: &[f32; PAC
             far[axis][slot] = f32::from(to[slot]);
         }
     }
+    let mut met = [0; 8];
     for group in 0..PACKET / S::F32_LANES {
-        let inverse = Vec3Lanes::of(simd, &rays.inverse, group);
-        let origin = Vec3Lanes::of(simd, &rays.origin, group);
-        let limit = Lanes::of(simd, limits, group);
-        let splat = |x: f32| Lanes::splat(simd, x);
-        let extent = |axis: usize| Lanes::splat(simd, f32::from_bits(u32::from(node.e[axis]) << 23));
-        let scale =
-            Vec3Lanes { x: inverse.x * extent(0), y: inverse.y * extent(1), z: inverse.z * extent(2) };
-        let start = Vec3Lanes::splat(simd, node.p) - origin;
-        let start = Vec3Lanes { x: start.x * inverse.x, y: start.y * inverse.y, z: start.z * inverse.z };
+        let rays = BoxRays::new(simd, node, packet, inverse, limits, group);
         for slot in 0..8 {
-            let x = splat(near[0][slot]) * scale.x + start.x;
-            let y = splat(near[1][slot]) * scale.y + start.y;
-            let z = splat(near[2][slot]) * scale.z + start.z;
-            let enters = x.larger(y).larger(z.larger(splat(0.0)));
-            let x = splat(far[0][slot]) * scale.x + start.x;
-            let y = splat(far[1][slot]) * scale.y + start.y;
-            let z = splat(far[2][slot]) * scale.z + start.z;
-            let leaves = x.smaller(y).smaller(z.smaller(limit));
-            all[slot] |= bits(simd, enters.at_most(leaves)) << (group * S::F32_LANES);
+            let near = [near[0][slot], near[1][slot], near[2][slot]];
+            let far = [far[0][slot], far[1][slot], far[2][slot]];
+            met[slot] |= (rays.meet(simd, near, far) << (group * S::F32_LANES)) as u8;
         }
     }
-    all
+    met
+}
+
+/// Rays in the coordinates of a node's boxes.
+struct BoxRays<S: Simd> {
+    scale: Vec3Lanes<S>,
+    start: Vec3Lanes<S>,
+    limit: Lanes<S>,
+}
+
+impl<S: Simd> BoxRays<S> {
+    #[inline(always)]
+    fn new(simd: S, node: &CwBvhNode, packet: &Packet, inverse: &[Row; 3], limits: &Row, group: usize) -> Self {
+        let [ex, ey, ez] = node.e;
+        let inverse = Vec3Lanes::of(simd, inverse, group);
+        let scale = Vec3Lanes {
+            x: inverse.x * Lanes::splat(simd, f32::from_bits(u32::from(ex) << 23)),
+            y: inverse.y * Lanes::splat(simd, f32::from_bits(u32::from(ey) << 23)),
+            z: inverse.z * Lanes::splat(simd, f32::from_bits(u32::from(ez) << 23)),
+        };
+        let start = Vec3Lanes::splat(simd, node.p) - Vec3Lanes::of(simd, &packet.origin, group);
+        let start = Vec3Lanes { x: start.x * inverse.x, y: start.y * inverse.y, z: start.z * inverse.z };
+        Self { scale, start, limit: Lanes::of(simd, limits, group) }
+    }
+
+    /// Bits of those that meet a box, whose corners are those that rays of the octant come to first and last.
+    #[inline(always)]
+    fn meet(&self, simd: S, near: [f32; 3], far: [f32; 3]) -> u32 {
+        let Self { scale, start, limit } = self;
+        let x = Lanes::splat(simd, near[0]) * scale.x + start.x;
+        let y = Lanes::splat(simd, near[1]) * scale.y + start.y;
+        let z = Lanes::splat(simd, near[2]) * scale.z + start.z;
+        let enters = x.larger(y).larger(z.larger(Lanes::splat(simd, 0.0)));
+        let x = Lanes::splat(simd, far[0]) * scale.x + start.x;
+        let y = Lanes::splat(simd, far[1]) * scale.y + start.y;
+        let z = Lanes::splat(simd, far[2]) * scale.z + start.z;
+        let leaves = x.smaller(y).smaller(z.smaller(*limit));
+        bits(simd, enters.at_most(leaves))
+    }
 }

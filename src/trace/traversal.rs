@@ -11,7 +11,7 @@ use pulp::bytemuck::cast_slice;
 use pulp::{Simd, WithSimd};
 
 /// A ray made ready for the box test.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub struct BoxRay {
     /// Start.
     pub origin: Vec3,

@@ -1,6 +1,6 @@
 //! A watertight ray-triangle test (Woop, Benthin and Wald 2013), in f64.
 
-use crate::trace::intersector::Ray;
+use crate::math::eights::{Row, vector};
 use crate::trace::packet::PACKET;
 use glam::{DVec3, Vec3};
 
@@ -77,6 +77,7 @@ impl ShearedRay {
 }
 
 /// Several rays along one longest axis, sheared as each alone.
+#[derive(Default)]
 pub struct ShearedRays {
     /// The two axes across, and the longest.
     axes: [usize; 3],
@@ -91,34 +92,33 @@ pub struct HitLanes {
     /// The bits of those that do.
     pub met: u32,
     /// Distances along the rays.
-    pub t: [f32; PACKET],
+    pub t: Row,
     /// Weights of the second and third corner.
-    pub weights: [[f32; PACKET]; 2],
+    pub weights: [Row; 2],
 }
 
 impl ShearedRays {
-    /// Those of `rays`, all of one octant and one longest axis.
+    /// Those of rays that go to one octant and have one longest axis.
     #[inline(always)]
-    pub fn new(rays: &[Ray; PACKET]) -> Self {
-        let [x, y, along] = axes_of(rays[0].direction);
-        let zero = [0.0; PACKET];
-        let mut all = Self { axes: [x, y, along], origin: [zero; 3], slope: [zero; 2], per_length: zero };
-        for lane in 0..PACKET {
-            let (origin, direction) = (rays[lane].origin, rays[lane].direction);
-            for (i, axis) in all.axes.iter().enumerate() {
-                all.origin[i][lane] = f64::from(origin[*axis]);
-            }
-            let per_length = 1.0 / f64::from(direction[along]);
-            all.per_length[lane] = per_length;
-            all.slope[0][lane] = f64::from(direction[x]) * per_length;
-            all.slope[1][lane] = f64::from(direction[y]) * per_length;
+    pub fn new(origin: &[Row; 3], direction: &[Row; 3]) -> Self {
+        let axes = axes_of(vector(direction, 0));
+        let mut all = Self { axes, ..Self::default() };
+        let [x, y, along] = axes;
+        for i in 0..PACKET {
+            all.origin[0][i] = f64::from(origin[x][i]);
+            all.origin[1][i] = f64::from(origin[y][i]);
+            all.origin[2][i] = f64::from(origin[along][i]);
+            let per_length = 1.0 / f64::from(direction[along][i]);
+            all.per_length[i] = per_length;
+            all.slope[0][i] = f64::from(direction[x][i]) * per_length;
+            all.slope[1][i] = f64::from(direction[y][i]) * per_length;
         }
         all
     }
 
     /// What [`ShearedRay::intersect`] finds for each of those rays whose bits are set.
     #[inline(always)]
-    pub fn intersect(&self, corners: &[Vec3; 3], t_max: &[f32; PACKET], rays: u32) -> HitLanes {
+    pub fn intersect(&self, corners: &[Vec3; 3], t_max: &Row, rays: u32) -> HitLanes {
         let [a, b, c] = corners;
         let [x, y, z] = self.axes;
         let corners = [[a[x], a[y], a[z]], [b[x], b[y], b[z]], [c[x], c[y], c[z]]].map(|c| c.map(f64::from));
