@@ -8,8 +8,8 @@
 
 use super::View;
 use crate::estimate::batch::{self, BATCH, Vectors};
-use crate::math::eights::{Group, LANES, vector};
 use crate::estimate::parallelogram::within;
+use crate::math::eights::{Group, LANES, vector};
 use crate::photons::MapPhoton;
 use glam::{DVec2, DVec3};
 use pulp::{Arch, Simd, WithSimd};

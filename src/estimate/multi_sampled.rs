@@ -2,8 +2,8 @@
 
 use super::{Construction, Estimator, Gathered, Lookup, SamplingPoint, View};
 use crate::estimate::batch::{self, BATCH, Parallelograms, in_filter_space, weight_by_mean};
-use crate::math::eights::{Group, LANES, vector};
 use crate::estimate::settings::{Spec, SpecError};
+use crate::math::eights::{Group, LANES, vector};
 use crate::math::lanes::dispatch_in_eights;
 use crate::photons::MapPhoton;
 use glam::{DVec3, Vec3};

@@ -6,9 +6,9 @@
 //! which may stay functions of their own.
 
 use crate::estimate::batch::{BATCH, Parallelograms};
-use crate::math::eights::{LANES, vector};
 use crate::estimate::polygon::{GAUSS, SHORT, THIN};
 use crate::math::angle::angle;
+use crate::math::eights::{LANES, vector};
 use glam::{DVec2, DVec3, Vec3};
 use pulp::{Arch, Simd, WithSimd};
 use std::f64::consts::{PI, TAU};

@@ -71,6 +71,33 @@ pub fn bits<S: Simd>(simd: S, mask: S::m32s) -> u32 {
     words.iter().rev().fold(0, |bits, word| bits << 1 | word & 1)
 }
 
+/// Where the numbers of a row are not zero, as bits.
+#[inline(always)]
+pub fn bits_of_row<S: Simd>(simd: S, row: &[f32; 8]) -> u32 {
+    let mut all = 0;
+    for group in 0..8 / S::F32_LANES {
+        let is_set = Lanes::splat(simd, 0.0).less(Lanes::of(simd, row, group).abs());
+        all |= bits(simd, is_set) << (group * S::F32_LANES);
+    }
+    all
+}
+
+/// Eight bytes as numbers.
+#[inline(always)]
+pub fn of_bytes<S: Simd>(simd: S, bytes: &[u8; 8]) -> [f32; 8] {
+    #[cfg(target_arch = "x86_64")]
+    if let Some(v3) = (&simd as &dyn Any).downcast_ref::<pulp::x86::V3>() {
+        // The compiler would take each byte by itself.
+        let words = v3.avx2._mm256_cvtepu8_epi32(pulp::cast([*bytes, [0; 8]]));
+        return pulp::cast(v3.avx._mm256_cvtepi32_ps(words));
+    }
+    let mut numbers = [0.0; 8];
+    for (number, byte) in numbers.iter_mut().zip(bytes) {
+        *number = f32::from(*byte);
+    }
+    numbers
+}
+
 /// A 32-bit number in each lane.
 #[derive(Clone, Copy, Debug)]
 pub struct Lanes<S: Simd> {

@@ -36,8 +36,9 @@ impl Octahedral {
         let folded = ((1.0 - y.abs()) * sign_x, (1.0 - x.abs()) * sign_y);
         let is_lower = v.z < 0.0;
         let (x, y) = (if is_lower { folded.0 } else { x }, if is_lower { folded.1 } else { y });
-        // A zero has no sign, as an integer has none.
-        [(x * SCALE).round_ties_even() + 0.0, (y * SCALE).round_ties_even() + 0.0]
+        // A zero has no sign, as an integer has none; what is no number is zero.
+        let (x, y) = ((x * SCALE).round_ties_even() + 0.0, (y * SCALE).round_ties_even() + 0.0);
+        [if x.is_nan() { 0.0 } else { x }, if y.is_nan() { 0.0 } else { y }]
     }
 
     /// The unit vector.

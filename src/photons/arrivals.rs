@@ -142,10 +142,8 @@ impl<const MIRROR: bool> WithSimd for Arrive<'_, MIRROR> {
             let v = vector(&of.vectors[0], lane);
             let dp = [vector(&of.vectors[1], lane), vector(&of.vectors[2], lane)];
             let dv = [vector(&of.vectors[3], lane), vector(&of.vectors[4], lane)];
-            let corners =
-                [vector(&of.vectors[5], lane), vector(&of.vectors[6], lane), vector(&of.vectors[7], lane)];
-            let normals =
-                [vector(&of.vectors[8], lane), vector(&of.vectors[9], lane), vector(&of.vectors[10], lane)];
+            let corners = [vector(&of.vectors[5], lane), vector(&of.vectors[6], lane), vector(&of.vectors[7], lane)];
+            let normals = [vector(&of.vectors[8], lane), vector(&of.vectors[9], lane), vector(&of.vectors[10], lane)];
             let is_smooth = of.smooth[lane] > 0.0;
             let weights = [of.weights[0][lane], of.weights[1][lane]];
             let place = Place::new(corners, normals, is_smooth, weights);
@@ -181,8 +179,8 @@ impl<const MIRROR: bool> WithSimd for Arrive<'_, MIRROR> {
                 let turning = Turning::new(corners, normals, weights, shading);
                 let turned = [turning.over(dp[0]), turning.over(dp[1])];
                 usual &= !place.without_shading & (shading.dot(v) < 0.0) & stays;
-                usual &= !is_smooth
-                    | (turning.is_defined & is_within(turned[0], LONGEST) & is_within(turned[1], LONGEST));
+                usual &=
+                    !is_smooth | (turning.is_defined & is_within(turned[0], LONGEST) & is_within(turned[1], LONGEST));
                 let turns = |dn: glam::DVec3| {
                     let dn = dn.as_vec3();
                     let of = |x: f32| f64::from(if is_smooth { x } else { 0.0 });

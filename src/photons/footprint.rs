@@ -70,11 +70,7 @@ impl FilterTransform {
         let inverse_area = 1.0 / (std::f64::consts::PI * long * short);
         let largest = f64::from(f32::MAX);
         Self {
-            rows: [
-                (axis * (1.0 / long)).as_vec3(),
-                (across * (1.0 / short)).as_vec3(),
-                (n * (1.0 / long)).as_vec3(),
-            ],
+            rows: [(axis * (1.0 / long)).as_vec3(), (across * (1.0 / short)).as_vec3(), (n * (1.0 / long)).as_vec3()],
             turn: principal.turn.as_vec2(),
             inverse_area: inverse_area.min(largest) as f32,
             reach: long as f32,
@@ -207,7 +203,8 @@ impl Principal {
         let per_axis = 1.0 / along.length();
         let axis = along * per_axis;
         let across = n.cross(axis) * 1f64.copysign(det);
-        let has_axis = (per_length > 0.0) & (per_length < f64::INFINITY) & (per_axis > 0.0) & (per_axis < f64::INFINITY);
+        let has_axis =
+            (per_length > 0.0) & (per_length < f64::INFINITY) & (per_axis > 0.0) & (per_axis < f64::INFINITY);
         Self { long, short, axis, across, turn, has_axis }
     }
 

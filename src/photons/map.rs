@@ -2,7 +2,6 @@
 
 use crate::math::eights::vector;
 use crate::math::rgb::Rgb;
-use crate::photons::Photon;
 use crate::photons::ellipsoid::meets_unit_ball;
 use crate::photons::footprint::FilterTransform;
 use crate::photons::kd_tree::{self, KdTree, Nearest, NearestQuery};

@@ -8,8 +8,8 @@ use crate::photons::emission::Emission;
 use crate::photons::spread::{self, DiffuseSpread};
 use crate::photons::{Photon, PhotonKind, StoredPhoton, StoredPhotons};
 use crate::scene::{Material, Scene};
-use crate::trace::surface::SELF_INTERSECTION;
 use crate::trace::scatter::{SpecularRay, reflected, refracted, specular_weights};
+use crate::trace::surface::SELF_INTERSECTION;
 use crate::trace::{Differential, Hit, Intersector, Ray, Surface};
 use glam::Vec3;
 use serde::Serialize;
@@ -270,7 +270,9 @@ impl Flight<'_> {
             rays.clear();
             rays.extend(photons.iter().map(|photon| photon.ray));
             self.intersector.closest_of(rays, hits);
-            self.scene.geometry.prefetch(hits.iter().flatten().map(|hit| hit.primitive as usize));
+            if self.intersector.is_large() {
+                self.scene.geometry.prefetch(hits.iter().flatten().map(|hit| hit.primitive as usize));
+            }
             goes_on.clear();
             goes_on.resize(photons.len(), false);
             for (number, hit) in hits.iter().enumerate() {

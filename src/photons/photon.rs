@@ -122,7 +122,9 @@ impl Footprinted for StoredPhoton {
             for (row, x) in encoded.footprint.iter_mut().zip(photon.footprint) {
                 row[lane] = x;
             }
-            for (row, x) in encoded.steps.iter_mut().zip([photon.normal.to_steps(), photon.direction.to_steps()].as_flattened()) {
+            for (row, x) in
+                encoded.steps.iter_mut().zip([photon.normal.to_steps(), photon.direction.to_steps()].as_flattened())
+            {
                 row[lane] = *x;
             }
         }

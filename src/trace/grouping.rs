@@ -4,6 +4,7 @@ use super::intersector::{FAR, Hit, Intersector, Ray};
 use super::packet::{PACKET, Packet, PacketTest, traverse_packet};
 use super::triangle::{ShearedRays, axes_of};
 use crate::math::eights::Row;
+use pulp::Simd;
 
 /// Fewer rays than these are not traced together.
 const FEW: usize = 3;
@@ -84,9 +85,9 @@ impl PacketTest for ClosestOfPacket<'_> {
     }
 
     #[inline(always)]
-    fn test(&mut self, leaf: usize, rays: u32, limits: &mut Row) {
+    fn test<S: Simd>(&mut self, simd: S, leaf: usize, rays: u32, limits: &mut Row) {
         if self.on.is_triangle(leaf) {
-            let hits = self.sheared.intersect(&self.on.leaves[leaf], &self.t, rays);
+            let hits = self.sheared.intersect(simd, &self.on.leaves[leaf], &self.t, rays);
             let mut met = hits.met;
             while met != 0 {
                 let lane = met.trailing_zeros() as usize;

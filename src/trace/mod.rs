@@ -2,8 +2,8 @@
 
 pub mod differential;
 pub mod direct;
-mod interleaved;
 mod grouping;
+mod interleaved;
 pub mod intersector;
 pub mod packet;
 pub mod scatter;

@@ -6,7 +6,7 @@
 use super::intersector::{Ray, SMALLEST_COMPONENT};
 use super::traversal::{Group, Stack};
 use crate::math::eights::{LANES, Row, set, vector};
-use crate::math::lanes::{EightLanes, Lanes, Vec3Lanes, bits, dispatch_eight_lanes};
+use crate::math::lanes::{EightLanes, Lanes, Vec3Lanes, bits, dispatch_eight_lanes, of_bytes};
 use glam::Vec3;
 use obvhs::cwbvh::node::CwBvhNode;
 use pulp::Simd;
@@ -86,7 +86,7 @@ pub trait PacketTest {
 
     /// Tests the entry `leaf` of the hierarchy's primitives for those rays whose bits are set in `rays`; `limits` is how far
     /// boxes are opened for each ray, which it may lower.
-    fn test(&mut self, leaf: usize, rays: u32, limits: &mut Row);
+    fn test<S: Simd>(&mut self, simd: S, leaf: usize, rays: u32, limits: &mut Row);
 }
 
 /// Hands `test` what [`traverse`](super::traversal::traverse) would for each ray of a packet, without a limit at first.
@@ -151,7 +151,7 @@ impl<T: PacketTest> EightLanes for PacketTraversal<'_, T> {
                 let meta = u32::from(node.child_meta[slot]);
                 let first = node.primitive_base_idx + (meta & 31);
                 for leaf in first..first + (meta >> 5).count_ones() {
-                    test.test(leaf as usize, u32::from(met[slot]), &mut limits);
+                    test.test(simd, leaf as usize, u32::from(met[slot]), &mut limits);
                 }
             }
             if shared.group.is_done() {
@@ -171,12 +171,8 @@ fn met_by<S: Simd>(simd: S, node: &CwBvhNode, packet: &Packet, inverse: &[Row; 3
     for axis in 0..3 {
         let goes_up = packet.octant >> (2 - axis) & 1 == 1;
         let (from, to) = if goes_up { (low[axis], high[axis]) } else { (high[axis], low[axis]) };
-        for slot in 0..8 {
-            near[axis][slot] = f32::from(from[slot]);
-        }
-        for slot in 0..8 {
-            far[axis][slot] = f32::from(to[slot]);
-        }
+        near[axis] = of_bytes(simd, from);
+        far[axis] = of_bytes(simd, to);
     }
     let mut met = [0; 8];
     for group in 0..PACKET / S::F32_LANES {

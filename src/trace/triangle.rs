@@ -1,8 +1,10 @@
 //! A watertight ray-triangle test (Woop, Benthin and Wald 2013), in f64.
 
 use crate::math::eights::{Row, vector};
+use crate::math::lanes::bits_of_row;
 use crate::trace::packet::PACKET;
 use glam::{DVec3, Vec3};
+use pulp::Simd;
 
 /// A ray sheared so that it runs along its longest axis; made once for each ray.
 ///
@@ -118,14 +120,13 @@ impl ShearedRays {
 
     /// What [`ShearedRay::intersect`] finds for each of those rays whose bits are set.
     #[inline(always)]
-    pub fn intersect(&self, corners: &[Vec3; 3], t_max: &Row, rays: u32) -> HitLanes {
+    pub fn intersect<S: Simd>(&self, simd: S, corners: &[Vec3; 3], t_max: &Row, rays: u32) -> HitLanes {
         let [a, b, c] = corners;
         let [x, y, z] = self.axes;
         let corners = [[a[x], a[y], a[z]], [b[x], b[y], b[z]], [c[x], c[y], c[z]]].map(|c| c.map(f64::from));
-        let mut hits = HitLanes { met: 0, t: [0.0; PACKET], weights: [[0.0; PACKET]; 2] };
         let zero = [0.0; PACKET];
         let (mut us, mut vs, mut ws) = (zero, zero, zero);
-        let mut may = [0u64; PACKET];
+        let mut may = [0.0; PACKET];
         for i in 0..PACKET {
             let (ox, oy, oz) = (self.origin[0][i], self.origin[1][i], self.origin[2][i]);
             let (sx, sy) = (self.slope[0][i], self.slope[1][i]);
@@ -137,14 +138,14 @@ impl ShearedRays {
             let v = ax * cy - ay * cx;
             let w = bx * ay - by * ax;
             let misses = ((u < 0.0) | (v < 0.0) | (w < 0.0)) & ((u > 0.0) | (v > 0.0) | (w > 0.0));
-            may[i] = if misses { 0 } else { 1 << i };
+            may[i] = if misses { 0.0 } else { 1.0 };
             (us[i], vs[i], ws[i]) = (u, v, w);
         }
-        let may = may.iter().fold(0, |all, own| all | own) as u32 & rays;
+        let may = bits_of_row(simd, &may) & rays;
         if may == 0 {
-            return hits;
+            return HitLanes { met: 0, t: [0.0; PACKET], weights: [[0.0; PACKET]; 2] };
         }
-        let mut met = [0u32; PACKET];
+        let (mut met, mut ts, mut bs, mut cs) = ([0.0f32; PACKET], [0.0; PACKET], [0.0; PACKET], [0.0; PACKET]);
         for i in 0..PACKET {
             let (u, v, w) = (us[i], vs[i], ws[i]);
             let det = u + v + w;
@@ -153,13 +154,12 @@ impl ShearedRays {
             let [a, b, c] = corners;
             let along = u * (a[2] - oz) + v * (b[2] - oz) + w * (c[2] - oz);
             let t = (along * (self.per_length[i] * per_det)) as f32;
-            met[i] = if (det != 0.0) & (t > 0.0) & (t <= t_max[i]) { 1 << i } else { 0 };
-            hits.t[i] = t;
-            hits.weights[0][i] = (v * per_det) as f32;
-            hits.weights[1][i] = (w * per_det) as f32;
+            met[i] = if (det != 0.0) & (t > 0.0) & (t <= t_max[i]) { 1.0 } else { 0.0 };
+            ts[i] = t;
+            bs[i] = (v * per_det) as f32;
+            cs[i] = (w * per_det) as f32;
         }
-        hits.met = met.iter().fold(0, |all, own| all | own) & may;
-        hits
+        HitLanes { met: bits_of_row(simd, &met) & may, t: ts, weights: [bs, cs] }
     }
 }
 
