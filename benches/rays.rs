@@ -83,8 +83,8 @@ fn bounces(g: &Geometry, intersector: &Intersector, count: usize) -> Vec<Ray> {
 }
 
 const RAYS: usize = 100_000;
-/// Rays that are asked for at a time, as the photon pass does.
-const WAVEFRONT: usize = 128;
+/// Rays that are asked for at a time, as the photon pass does at most.
+const WAVEFRONT: usize = 4096;
 
 fn rays() {
     let builders = [("medium", BvhBuildParams::medium_build()), ("very slow", BvhBuildParams::very_slow_build())];

@@ -288,6 +288,24 @@ mod tests {
         }
     }
 
+    struct Rows([f32; 8], [u8; 8]);
+
+    impl WithSimd for Rows {
+        type Output = (u32, [f32; 8]);
+
+        fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
+            (bits_of_row(simd, &self.0), of_bytes(simd, &self.1))
+        }
+    }
+
+    #[test]
+    fn rows_and_bytes_are_the_same_in_all_instructions() {
+        let (row, bytes) = ([0.0, 1.0, -0.0, 1.0, 0.0, 0.0, 1e-30, 1.0], [0, 1, 7, 127, 128, 200, 254, 255]);
+        let expected = (0b1100_1010, [0.0, 1.0, 7.0, 127.0, 128.0, 200.0, 254.0, 255.0]);
+        assert_eq!(dispatch_in_eights(Rows(row, bytes)), expected);
+        assert_eq!(Arch::Scalar.dispatch(Rows(row, bytes)), expected);
+    }
+
     /// The same bits in the widest instructions and in none, also of what is no number.
     #[test]
     fn masks_are_the_same_in_all_instructions() {

@@ -59,9 +59,19 @@ impl Arrivals {
         self.count == LANES
     }
 
-    /// Which photons they are.
-    pub fn numbers(&self) -> &[u32] {
-        &self.numbers[..self.count]
+    /// How many there are.
+    pub fn len(&self) -> usize {
+        self.count
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.count == 0
+    }
+
+    /// Which of the caller's photons is in a lane.
+    pub fn number(&self, lane: usize) -> usize {
+        self.numbers[lane] as usize
     }
 
     /// Forgets them.

@@ -4,6 +4,7 @@ use crate::math::eights::{Group, LANES, Row, set, vector};
 use crate::math::elementary::sin_cos;
 use crate::math::frame::on_sphere;
 use crate::photons::emission::{Emission, cone_differential, emit};
+use crate::photons::projection::Cells;
 use crate::scene::{Light, Scene};
 use crate::trace::Differential;
 use glam::Vec3;
@@ -52,6 +53,18 @@ impl WithSimd for FromPoint<'_> {
             set(&mut starts[2], lane, b);
         }
         starts
+    }
+}
+
+/// Twelve bits by which photons of a light that start and go about alike are near each other: from the numbers that they are
+/// made of, before `cells` take them to marked cells.
+pub fn start_cell(light: &Light, cells: Option<&Cells>, x: &[f32; 4]) -> u32 {
+    let of = |i: usize, parts: f32| (x[i] * parts) as u32;
+    match light {
+        // The first number chooses the cell, and cells are in order.
+        _ if cells.is_some() => of(0, 4096.0),
+        Light::Quad { .. } | Light::Mesh { .. } => of(2, 8.0) << 9 | of(3, 8.0) << 6 | of(0, 8.0) << 3 | of(1, 8.0),
+        _ => of(0, 64.0) << 6 | of(1, 64.0),
     }
 }
 

@@ -220,6 +220,8 @@ impl Principal {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::frame::{tangents, uniform_sphere};
+    use crate::math::sequence::{Sampling, Sequence};
     use proptest::prelude::*;
 
     fn filter(t: &FilterTransform, v: Vec3) -> Vec3 {
@@ -244,6 +246,41 @@ mod tests {
         let area = std::f32::consts::PI * 4.0 * a.cross(b).length();
         assert!((t.inverse_area * area - 1.0).abs() < 1e-5);
         assert!(!t.floored && !t.capped);
+    }
+
+    /// In lanes each is what it is alone: ellipses of all shapes, circles, lines, points and what is not finite.
+    #[test]
+    fn a_group_is_each_alone() {
+        let sequence = Sequence::new(Sampling::Random, 11);
+        for group in 0..3000u64 {
+            let mut vectors = [[[0.0; LANES]; 3]; 3];
+            let mut given = Vec::new();
+            for lane in 0..LANES {
+                let (x, y) = (sequence.four(group, lane as u32), sequence.four(group, 8 + lane as u32));
+                let normal = uniform_sphere(x[0], x[1]).normalize();
+                let (t, b) = tangents(normal);
+                let long = 10f32.powf(8.0 * y[0] - 6.0);
+                let short = long * 10f32.powf(-12.0 * y[1]);
+                let (a, b) = match (group + lane as u64) % 16 {
+                    0 => (Vec3::ZERO, Vec3::ZERO),
+                    1 => (t * long, Vec3::ZERO),
+                    2 => (t * long, t * short),
+                    3 => (t * long, b * long),
+                    4 => (Vec3::NAN, b * long),
+                    5 => (Vec3::X * f32::INFINITY, Vec3::NAN),
+                    _ => (t * long, b * short + t * (x[3] * long)),
+                };
+                for (of, v) in vectors.iter_mut().zip([a, b, normal]) {
+                    set(of, lane, v);
+                }
+                given.push(([a, b], normal));
+            }
+            let together = FilterTransform::of_group(&vectors, 1.7, 1e-6, 10.0);
+            for (lane, (footprint, normal)) in given.into_iter().enumerate() {
+                let alone = FilterTransform::new(footprint, normal, 1.7, 1e-6, 10.0);
+                assert_eq!(format!("{:?}", together.at(lane)), format!("{alone:?}"));
+            }
+        }
     }
 
     proptest! {

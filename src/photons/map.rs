@@ -327,6 +327,7 @@ mod tests {
     use super::*;
     use crate::math::frame::{tangents, uniform_sphere};
     use crate::math::sequence::{Sampling, Sequence};
+    use crate::photons::Photon;
 
     const LIMITS: FootprintLimits = FootprintLimits { scale: 1.0, floor: 1e-6, ceiling: 10.0 };
 

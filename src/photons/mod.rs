@@ -14,6 +14,7 @@ pub mod photon;
 pub mod projection;
 pub mod spread;
 pub mod together;
+pub mod wavefront;
 
 pub use map::{MapPhoton, PhotonMap};
 pub use photon::{Photon, PhotonKind, StoredPhoton, StoredPhotons};

@@ -3,13 +3,11 @@
 use crate::math::frame::cosine_hemisphere;
 use crate::math::rgb::{Rgb, mean};
 use crate::math::sequence::Sequence;
-use crate::photons::arrivals::Arrivals;
 use crate::photons::emission::Emission;
 use crate::photons::spread::{self, DiffuseSpread};
-use crate::photons::{Photon, PhotonKind, StoredPhoton, StoredPhotons};
+use crate::photons::{Photon, PhotonKind, StoredPhotons};
 use crate::scene::{Material, Scene};
 use crate::trace::scatter::{SpecularRay, reflected, refracted, specular_weights};
-use crate::trace::surface::SELF_INTERSECTION;
 use crate::trace::{Differential, Hit, Intersector, Ray, Surface};
 use glam::Vec3;
 use serde::Serialize;
@@ -77,13 +75,13 @@ pub struct Flight<'a> {
 /// A photon before it meets its next surface.
 #[derive(Clone, Copy, Debug)]
 pub struct PathState {
-    index: u64,
-    ray: Ray,
-    differential: Differential,
-    power: Rgb,
-    kind: PhotonKind,
+    pub(super) index: u64,
+    pub(super) ray: Ray,
+    pub(super) differential: Differential,
+    pub(super) power: Rgb,
+    pub(super) kind: PhotonKind,
     /// The dielectric that it knows itself to be in.
-    medium: Option<u32>,
+    pub(super) medium: Option<u32>,
 }
 
 impl PathState {
@@ -91,69 +89,6 @@ impl PathState {
     pub fn new(index: u64, emission: &Emission, power: Rgb) -> Self {
         let ray = Ray { origin: emission.origin, direction: emission.direction };
         Self { index, ray, differential: emission.differential, power, kind: PhotonKind::Direct, medium: None }
-    }
-}
-
-/// Photons that are followed together, and what that takes.
-#[derive(Clone, Default)]
-pub struct Wavefront {
-    /// Those on their way, in the order of their indices.
-    pub photons: Vec<PathState>,
-    rays: Vec<Ray>,
-    hits: Vec<Option<Hit>>,
-    /// What they left, by bounce: with the index among them of the photon that did.
-    stored: Vec<(u32, PhotonKind, StoredPhoton)>,
-    order: Order,
-    goes_on: Vec<bool>,
-    mirrored: Arrivals,
-    arriving: Arrivals,
-}
-
-/// What becomes of a photon at a surface, as far as the two tell.
-enum Event {
-    /// It ends, and leaves nothing.
-    End,
-    /// A mirror of triangles reflects it.
-    Mirror,
-    /// It is stored on a triangle, and ends.
-    Store,
-    /// Any of these, or another.
-    Other,
-}
-
-/// Sorts small numbers, those that are alike in the order in which they come.
-#[derive(Clone, Debug, Default)]
-pub struct Order {
-    places: Vec<u32>,
-    keys: Vec<u32>,
-    sorted: Vec<u32>,
-}
-
-impl Order {
-    /// The indices of `keys` by key.
-    pub fn by(&mut self, keys: impl Iterator<Item = u32>) -> &[u32] {
-        let Self { places, keys: own, sorted } = self;
-        own.clear();
-        own.extend(keys);
-        places.clear();
-        for key in own.iter() {
-            let key = *key as usize + 1;
-            if key >= places.len() {
-                places.resize(key + 1, 0);
-            }
-            places[key] += 1;
-        }
-        for i in 1..places.len() {
-            places[i] += places[i - 1];
-        }
-        sorted.clear();
-        sorted.resize(own.len(), 0);
-        for (index, key) in own.iter().enumerate() {
-            let place = &mut places[*key as usize];
-            sorted[*place as usize] = index as u32;
-            *place += 1;
-        }
-        sorted
     }
 }
 
@@ -248,161 +183,10 @@ impl Flight<'_> {
         photon.power
     }
 
-    /// [`Self::trace`] of each photon of a wavefront, all to one surface before any goes on to the next: their rays are on their
-    /// way together. What is stored is in the same order.
-    ///
-    /// Calls `cut_off` with the power of each that the bounce limit ended, W.
-    pub fn trace_wavefront(
-        &self,
-        wavefront: &mut Wavefront,
-        first: u64,
-        count: u64,
-        out: &mut StoredPhotons,
-        counts: &mut PathCounts,
-        mut cut_off: impl FnMut(Rgb),
-    ) {
-        let Wavefront { photons, rays, hits, stored, order, goes_on, mirrored, arriving } = wavefront;
-        stored.clear();
-        for bounce in 0..self.settings.max_depth {
-            if photons.is_empty() {
-                break;
-            }
-            rays.clear();
-            rays.extend(photons.iter().map(|photon| photon.ray));
-            self.intersector.closest_of(rays, hits);
-            if self.intersector.is_large() {
-                self.scene.geometry.prefetch(hits.iter().flatten().map(|hit| hit.primitive as usize));
-            }
-            goes_on.clear();
-            goes_on.resize(photons.len(), false);
-            for (number, hit) in hits.iter().enumerate() {
-                let Some(hit) = hit else { continue };
-                let photon = &photons[number];
-                match self.event(photon, hit) {
-                    Event::End => {}
-                    Event::Mirror => {
-                        if mirrored.push(number, &self.scene.geometry, &photon.ray, &photon.differential, hit) {
-                            self.mirror(mirrored, photons, hits, goes_on, bounce, count, counts);
-                        }
-                    }
-                    Event::Store => {
-                        if arriving.push(number, &self.scene.geometry, &photon.ray, &photon.differential, hit) {
-                            self.store(arriving, photons, hits, first, bounce, count, counts, stored);
-                        }
-                    }
-                    Event::Other => {
-                        let local = (photon.index - first) as u32;
-                        let mut store = |kind, photon: Photon| stored.push((local, kind, photon.into()));
-                        let photon = &mut photons[number];
-                        goes_on[number] = self.meet(photon, hit, bounce, count, &mut store, counts, &mut Unrecorded);
-                    }
-                }
-            }
-            self.mirror(mirrored, photons, hits, goes_on, bounce, count, counts);
-            self.store(arriving, photons, hits, first, bounce, count, counts, stored);
-            let mut goes_on = goes_on.iter();
-            photons.retain(|_| goes_on.next().is_some_and(|on| *on));
-        }
-        photons.sort_unstable_by_key(|photon| photon.index);
-        for photon in photons.drain(..) {
-            counts.depth += 1;
-            cut_off(photon.power);
-        }
-        for &at in order.by(stored.iter().map(|(place, ..)| *place)) {
-            let (_, kind, photon) = stored[at as usize];
-            out.of_mut(kind).push(photon);
-        }
-    }
-
-    fn event(&self, photon: &PathState, hit: &Hit) -> Event {
-        let geometry = &self.scene.geometry;
-        let index = hit.primitive as usize;
-        let material = &self.scene.materials[geometry.material(index)];
-        let is_plain = self.settings.differentials && photon.medium.is_none() && index < geometry.triangles.len();
-        match material {
-            Material::Diffuse { .. } if self.settings.global => Event::Other,
-            Material::Diffuse { .. } if !self.keeps(photon.kind) => Event::End,
-            Material::Diffuse { .. } if is_plain => Event::Store,
-            Material::Mirror { .. } if is_plain => Event::Mirror,
-            _ => Event::Other,
-        }
-    }
-
-    #[expect(clippy::too_many_arguments, reason = "outputs that the caller keeps between photons")]
-    fn mirror(
-        &self,
-        arrivals: &mut Arrivals,
-        photons: &mut [PathState],
-        hits: &[Option<Hit>],
-        goes_on: &mut [bool],
-        bounce: u32,
-        count: u64,
-        counts: &mut PathCounts,
-    ) {
-        if arrivals.numbers().is_empty() {
-            return;
-        }
-        let arrived = arrivals.arrive::<true>([self.scene.radius, MAX_ANGLE]);
-        let offset = self.scene.radius * SELF_INTERSECTION;
-        for (lane, &number) in arrivals.numbers().iter().enumerate() {
-            let number = number as usize;
-            let Some(hit) = &hits[number] else { continue };
-            let photon = &mut photons[number];
-            let material = &self.scene.materials[self.scene.geometry.material(hit.primitive as usize)];
-            goes_on[number] = match material {
-                Material::Mirror { reflectance } if arrived.is_usual(lane) => {
-                    let q = share(photon.power, *reflectance);
-                    let x = if q < 1.0 { self.sequence.four(photon.index, 1 + bounce)[0] } else { 0.0 };
-                    let origin = arrived.position(lane) + arrived.normal(lane) * offset;
-                    photon.ray = Ray { origin, direction: arrived.direction(lane) };
-                    photon.differential = arrived.differential(lane);
-                    photon.power = photon.power * *reflectance / q;
-                    if photon.kind == PhotonKind::Direct {
-                        photon.kind = PhotonKind::Caustic;
-                    }
-                    x < q
-                }
-                _ => self.meet(photon, hit, bounce, count, &mut |_, _| {}, counts, &mut Unrecorded),
-            };
-        }
-        arrivals.clear();
-    }
-
-    #[expect(clippy::too_many_arguments, reason = "outputs that the caller keeps between photons")]
-    fn store(
-        &self,
-        arrivals: &mut Arrivals,
-        photons: &mut [PathState],
-        hits: &[Option<Hit>],
-        first: u64,
-        bounce: u32,
-        count: u64,
-        counts: &mut PathCounts,
-        stored: &mut Vec<(u32, PhotonKind, StoredPhoton)>,
-    ) {
-        if arrivals.numbers().is_empty() {
-            return;
-        }
-        let arrived = arrivals.arrive::<false>([self.scene.radius, MAX_ANGLE]);
-        for (lane, &number) in arrivals.numbers().iter().enumerate() {
-            let number = number as usize;
-            let Some(hit) = &hits[number] else { continue };
-            let photon = &mut photons[number];
-            let local = (photon.index - first) as u32;
-            if arrived.is_usual(lane) {
-                stored.push((local, photon.kind, arrived.stored(lane, photon.power)));
-            } else {
-                let mut store = |kind, photon: Photon| stored.push((local, kind, photon.into()));
-                self.meet(photon, hit, bounce, count, &mut store, counts, &mut Unrecorded);
-            }
-        }
-        arrivals.clear();
-    }
-
     /// What becomes of a photon at the surface that it `hit`; whether it goes on.
     #[expect(clippy::too_many_arguments, reason = "outputs that the caller keeps between photons")]
     #[inline(always)]
-    fn meet(
+    pub(super) fn meet(
         &self,
         photon: &mut PathState,
         hit: &Hit,
@@ -492,7 +276,7 @@ impl Flight<'_> {
         true
     }
 
-    fn keeps(&self, kind: PhotonKind) -> bool {
+    pub(super) fn keeps(&self, kind: PhotonKind) -> bool {
         match kind {
             PhotonKind::Direct => self.settings.direct,
             PhotonKind::Caustic => self.settings.caustic,
@@ -551,7 +335,7 @@ pub fn attenuation(scene: &Scene, medium: Option<u32>, distance: f32) -> Option<
 }
 
 /// Share of `power` that `weight` lets through, by the mean of the channels.
-fn share(power: Rgb, weight: Rgb) -> f32 {
+pub(super) fn share(power: Rgb, weight: Rgb) -> f32 {
     let whole = mean(power);
     if whole > 0.0 { (mean(power * weight) / whole).clamp(0.0, 1.0) } else { 0.0 }
 }

@@ -322,4 +322,28 @@ mod tests {
             }
         }
     }
+
+    /// A group comes back as each photon of it alone.
+    #[test]
+    fn a_group_is_each_alone() {
+        let sequence = Sequence::new(Sampling::Random, 4);
+        for i in 0..2000 {
+            let photons: [StoredPhoton; LANES] = std::array::from_fn(|lane| {
+                let (x, y) = (sequence.four(i, lane as u32), sequence.four(i, 8 + lane as u32));
+                let (normal, direction) =
+                    (uniform_sphere(x[0], x[1]).normalize(), uniform_sphere(y[0], y[1]).normalize());
+                let footprint = [direction * x[2], normal.cross(direction) * x[3]];
+                Photon { position: direction, direction, normal, power: Rgb::ONE, footprint }.into()
+            });
+            let together = StoredPhoton::group(&photons);
+            for (lane, photon) in photons.into_iter().enumerate() {
+                let Photon { footprint: [a, b], normal, direction, .. } = photon.into();
+                let of = |v: usize| crate::math::eights::vector(&together[v], lane).to_array().map(f32::to_bits);
+                assert_eq!(
+                    [of(0), of(1), of(2), of(3)],
+                    [a, b, normal, direction].map(|v| v.to_array().map(f32::to_bits))
+                );
+            }
+        }
+    }
 }

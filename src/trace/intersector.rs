@@ -2,6 +2,7 @@
 
 use crate::math::hash::mix;
 use crate::scene::Geometry;
+use crate::trace::builder::{SOME_RAYS, build_parameters};
 use crate::trace::interleaved::traverse_interleaved;
 use crate::trace::packet::inverse_of;
 use crate::trace::traversal::{BoxRay, LeafTest, is_large, traverse};
@@ -68,6 +69,9 @@ const WIDEST: f32 = 1.0 / 1024.0;
 /// farther away rounding would be more than the padding.
 pub(super) const FAR: f32 = 4.0 * SCALED_RADIUS;
 
+/// Nodes of the largest hierarchy that packets of rays go through: in larger ones waiting for memory takes longer than testing.
+const MOST_NODES: usize = 10_000;
+
 /// Smallest component of a direction that the box test tells from none: at [`FAR`] it moves a ray by nothing, and its
 /// inverse times a coordinate is no infinity.
 pub(super) const SMALLEST_COMPONENT: f32 = 1e-20;
@@ -126,11 +130,12 @@ impl Intersector {
         closest.hit()
     }
 
-    /// [`Self::closest`] of each, in `hits`: in a large scene several are on their way at once, and wait for memory together.
+    /// [`Self::closest`] of each, in `hits`. Neighbours best go about the same way: they are traced together. In a scene so large
+    /// that rays wait for memory several are on their way at once instead, and wait together.
     pub fn closest_of(&self, rays: &[Ray], hits: &mut Vec<Option<Hit>>) {
         hits.clear();
         hits.resize(rays.len(), None);
-        if !self.is_large() {
+        if self.bvh.nodes.len() <= MOST_NODES {
             self.closest_in_packets(rays, hits);
             return;
         }
@@ -344,21 +349,6 @@ pub fn sphere(ray: &Ray, center: Vec3, radius: f32, t_max: f32) -> Option<f32> {
     (t > 0.0 && t <= t_max).then_some(t)
 }
 
-/// Rays of a render that nobody has counted.
-const SOME_RAYS: u64 = 20_000_000;
-
-/// How the hierarchy over so many surfaces is built if so many rays are to come.
-///
-/// The slowest builder takes the time of some six rays for each surface, the one between that of one, and the fastest less;
-/// their hierarchies differ by a twentieth or less in the time of a ray (`cargo bench --bench rays`).
-pub fn build_parameters(primitives: usize, rays: u64) -> BvhBuildParams {
-    match rays / primitives.max(1) as u64 {
-        100.. => BvhBuildParams::very_slow_build(),
-        10..100 => BvhBuildParams::medium_build(),
-        _ => BvhBuildParams::very_fast_build(),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -484,13 +474,13 @@ mod tests {
         }
     }
 
-    /// Many at a time are each alone, in a small scene and in one whose rays are interleaved: fewer than are in flight, and
-    /// more; those that miss, and those that are not finite.
+    /// Many at a time are each alone, in scenes whose rays go in packets and in one where they are interleaved: fewer than go
+    /// together, and more; those that miss, that start far away, that run along an axis, and those that are not finite.
     #[test]
     fn rays_together_meet_what_each_meets_alone() {
         let sequence = Sequence::new(Sampling::Random, 9);
         let mut met = 0;
-        for (triangles, is_large) in [(0, false), (300, false), (20_000, true)] {
+        for (triangles, is_large) in [(0, false), (300, false), (20_000, true), (80_000, true)] {
             let g = soup(triangles, 60);
             let intersector = Intersector::new(&g, 1.0);
             assert_eq!(intersector.is_large(), is_large);
@@ -500,8 +490,16 @@ mod tests {
                     .map(|i| {
                         let (x, y) = (sequence.four(i, 0), sequence.four(i, 1));
                         let origin = Vec3::new(x[0], x[1], x[2]) * 2.0 - 0.5;
-                        let origin = if i % 50 == 7 { Vec3::NAN } else { origin };
-                        Ray { origin, direction: crate::math::frame::uniform_sphere(y[0], y[1]).normalize() }
+                        let mut direction = crate::math::frame::uniform_sphere(y[0], y[1]).normalize();
+                        if i % 5 == 3 {
+                            direction[i as usize % 3] = if i % 2 == 0 { 0.0 } else { -0.0 };
+                        }
+                        let origin = match i % 50 {
+                            7 => Vec3::NAN,
+                            11 => origin - direction * 1e5,
+                            _ => origin,
+                        };
+                        Ray { origin, direction }
                     })
                     .collect();
                 intersector.closest_of(&rays, &mut hits);

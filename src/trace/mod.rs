@@ -1,5 +1,6 @@
 //! Rays, ray differentials, the intersector, and direct light by shadow rays.
 
+pub mod builder;
 pub mod differential;
 pub mod direct;
 mod grouping;

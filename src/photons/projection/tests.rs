@@ -1,4 +1,5 @@
 use super::*;
+use crate::math::eights::LANES;
 use crate::math::rgb::Rgb;
 use crate::math::sequence::{Sampling, Sequence};
 use crate::photons::emission::emit;
@@ -75,6 +76,25 @@ fn no_photon_is_missed() {
             let share = f64::from(marked) / photons as f64;
             assert!((share - cells.share()).abs() < 0.01, "{i}: {share} {}", cells.share());
             assert!(met <= marked);
+        }
+    }
+}
+
+/// A group's numbers come out as each photon's alone.
+#[test]
+fn a_group_of_numbers_is_each_alone() {
+    for scene in scenes() {
+        let map = ProjectionMap::new(&scene).expect("specular surfaces");
+        let sequence = Sequence::new(Sampling::Random, 6);
+        for light in 0..scene.lights.len() {
+            for group in 0..500 {
+                let x: [[f32; 4]; LANES] = std::array::from_fn(|lane| sequence.four(group, lane as u32));
+                let rows = std::array::from_fn(|d| std::array::from_fn(|lane| x[lane][d]));
+                let together = map.light(light).numbers_of_group(&rows);
+                for (lane, x) in x.into_iter().enumerate() {
+                    assert_eq!(map.light(light).numbers(x), [0, 1, 2, 3].map(|d: usize| together[d][lane]));
+                }
+            }
         }
     }
 }
