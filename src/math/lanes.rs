@@ -23,13 +23,16 @@ pub fn dispatch_in_eights<K: WithSimd>(kernel: K) -> K::Output {
 
 /// What is written for eight lanes of 32 bits, and for more of 64 where the compiler makes lanes of loops.
 pub trait EightLanes {
+    /// What comes of it.
+    type Output;
+
     /// Does it; `simd` has eight lanes at most.
-    fn run<S: Simd>(self, simd: S);
+    fn run<S: Simd>(self, simd: S) -> Self::Output;
 }
 
 /// Runs `kernel` in the widest instructions that the processor has.
 #[inline(always)]
-pub fn dispatch_eight_lanes<K: EightLanes>(kernel: K) {
+pub fn dispatch_eight_lanes<K: EightLanes>(kernel: K) -> K::Output {
     #[cfg(target_arch = "x86_64")]
     if let Some(v4) = pulp::x86::V4::try_new() {
         return Simd::vectorize(v4, Within { kernel, simd: *v4 });
@@ -38,7 +41,7 @@ pub fn dispatch_eight_lanes<K: EightLanes>(kernel: K) {
     if let Some(v3) = pulp::x86::V3::try_new() {
         return Simd::vectorize(v3, Within { kernel, simd: v3 });
     }
-    Arch::Scalar.dispatch(Within { kernel, simd: pulp::Scalar });
+    Arch::Scalar.dispatch(Within { kernel, simd: pulp::Scalar })
 }
 
 /// A kernel for eight lanes in instructions that may have more.
@@ -48,11 +51,11 @@ struct Within<K, S> {
 }
 
 impl<K: EightLanes, L: Simd> WithSimd for Within<K, L> {
-    type Output = ();
+    type Output = K::Output;
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) {
-        self.kernel.run(self.simd);
+    fn with_simd<S: Simd>(self, _: S) -> K::Output {
+        self.kernel.run(self.simd)
     }
 }
 

@@ -1,13 +1,16 @@
 //! Many rays through a small hierarchy: those that go about the same way are traced together.
 
 use super::intersector::{FAR, Hit, Intersector, Ray};
-use super::packet::{PACKET, Packet, PacketTest, traverse_packet};
+use super::packet::{PACKET, Packet, PacketTest, Visits, traverse_packet};
 use super::triangle::{ShearedRays, axes_of};
 use crate::math::eights::Row;
 use pulp::Simd;
 
-/// Fewer rays than these are not traced together.
+/// Fewer rays than these are not traced together, nor are those that share nodes with fewer on average.
 const FEW: usize = 3;
+
+/// Nodes that packets visit before that is judged.
+const ENOUGH: u32 = 200;
 
 /// Rays of a packet that wait for others, and which they are of all.
 #[derive(Clone, Copy)]
@@ -22,7 +25,13 @@ impl Intersector {
         // Three for each octant: one for each axis that may be the longest.
         let mut waiting: [Waiting; 24] =
             std::array::from_fn(|i| Waiting { packet: Packet::new(i as u32 / 3), numbers: [0; PACKET] });
+        let mut visits = Visits::default();
         for (number, ray) in rays.iter().enumerate() {
+            // Rays that go anywhere take longer together.
+            if visits.nodes > ENOUGH && visits.by_rays < visits.nodes * FEW as u32 {
+                hits[number] = self.closest(ray);
+                continue;
+            }
             let scaled = Ray { origin: ray.origin * self.scale, ..*ray };
             if !self.is_sound(&scaled) {
                 continue;
@@ -36,7 +45,8 @@ impl Intersector {
             let Waiting { packet, numbers } = &mut waiting[(x << 2 | y << 1 | z) * 3 + along];
             numbers[packet.push(&scaled)] = number as u32;
             if packet.len() == PACKET {
-                self.closest_of_packet(packet, numbers, hits);
+                let own = self.closest_of_packet(packet, numbers, hits);
+                visits = Visits { nodes: visits.nodes + own.nodes, by_rays: visits.by_rays + own.by_rays };
                 packet.clear();
             }
         }
@@ -51,7 +61,7 @@ impl Intersector {
         }
     }
 
-    fn closest_of_packet(&self, packet: &Packet, numbers: &[u32; PACKET], hits: &mut [Option<Hit>]) {
+    fn closest_of_packet(&self, packet: &Packet, numbers: &[u32; PACKET], hits: &mut [Option<Hit>]) -> Visits {
         let mut closest = ClosestOfPacket {
             on: self,
             packet,
@@ -60,10 +70,11 @@ impl Intersector {
             leaves: [usize::MAX; PACKET],
             weights: [[0.0; 2]; PACKET],
         };
-        traverse_packet(&self.bvh.nodes, packet, &mut closest);
+        let visits = traverse_packet(&self.bvh.nodes, packet, &mut closest);
         for (lane, &number) in numbers[..packet.len()].iter().enumerate() {
             hits[number as usize] = self.hit(closest.leaves[lane], closest.t[lane], closest.weights[lane]);
         }
+        visits
     }
 }
 

@@ -89,11 +89,18 @@ pub trait PacketTest {
     fn test<S: Simd>(&mut self, simd: S, leaf: usize, rays: u32, limits: &mut Row);
 }
 
+/// What a packet's rays had in common.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Visits {
+    /// Nodes that any of them visited.
+    pub nodes: u32,
+    /// Nodes that each of them visited, in all.
+    pub by_rays: u32,
+}
+
 /// Hands `test` what [`traverse`](super::traversal::traverse) would for each ray of a packet, without a limit at first.
-pub fn traverse_packet(nodes: &[CwBvhNode], packet: &Packet, test: &mut impl PacketTest) {
-    if !nodes.is_empty() {
-        dispatch_eight_lanes(PacketTraversal { nodes, packet, test });
-    }
+pub fn traverse_packet(nodes: &[CwBvhNode], packet: &Packet, test: &mut impl PacketTest) -> Visits {
+    if nodes.is_empty() { Visits::default() } else { dispatch_eight_lanes(PacketTraversal { nodes, packet, test }) }
 }
 
 struct PacketTraversal<'a, T> {
@@ -111,8 +118,10 @@ struct Shared {
 }
 
 impl<T: PacketTest> EightLanes for PacketTraversal<'_, T> {
+    type Output = Visits;
+
     #[inline(always)]
-    fn run<S: Simd>(self, simd: S) {
+    fn run<S: Simd>(self, simd: S) -> Visits {
         let Self { nodes, packet, test } = self;
         let octant = packet.octant;
         let inverse = packet.inverse();
@@ -121,10 +130,13 @@ impl<T: PacketTest> EightLanes for PacketTraversal<'_, T> {
         let mut stack = Stack::new();
         let active = u8::MAX >> (PACKET - packet.count);
         let mut shared = Shared { group: Group::ROOT, rays: [active; 8] };
+        let mut visits = Visits::default();
         loop {
             let (index, rest) = shared.group.nearest(octant);
             let own = shared.rays[shared.group.child() as usize];
             let node = &nodes[index];
+            visits.nodes += 1;
+            visits.by_rays += own.count_ones();
             if !rest.is_done() {
                 stack.push(Shared { group: rest, ..shared });
             }
@@ -155,7 +167,7 @@ impl<T: PacketTest> EightLanes for PacketTraversal<'_, T> {
                 }
             }
             if shared.group.is_done() {
-                let Some(next) = stack.pop() else { return };
+                let Some(next) = stack.pop() else { return visits };
                 shared = next;
             }
         }
