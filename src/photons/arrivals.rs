@@ -2,7 +2,7 @@
 //!
 //! It is computed as for each alone, to the bit, and without a branch; what is rare is only noticed, and left to the caller.
 
-use crate::math::eights::{Group, LANES, Row, is_within, set, vector};
+use crate::math::eights::{Group, LANES, Row, choose, is_within, set, vector};
 use crate::math::rgb::Rgb;
 use crate::photons::StoredPhoton;
 use crate::photons::photon::Encoded;
@@ -10,7 +10,7 @@ use crate::scene::Geometry;
 use crate::trace::differential::{LONGEST, reflect, renormalized, transfer};
 use crate::trace::surface::{Place, Turning, corner_normals};
 use crate::trace::{Differential, Hit, Ray};
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use pulp::{Arch, Simd, WithSimd};
 
 /// Photons that arrive: direction, differential (dP, dV), the triangle's corners and their normals.
@@ -47,8 +47,8 @@ impl Arrivals {
         let [a, b, c] = geometry.corners(triangle);
         let [na, nb, nc] = normals.unwrap_or_default();
         let vectors = [ray.direction, d.dp[0], d.dp[1], d.dv[0], d.dv[1], a, b, c, na, nb, nc];
-        for i in 0..VECTORS {
-            set(&mut self.vectors[i], lane, vectors[i]);
+        for (of, v) in self.vectors.iter_mut().zip(vectors) {
+            set(of, lane, v);
         }
         self.distance[lane] = hit.t;
         self.weights[0][lane] = hit.weights[0];
@@ -146,67 +146,128 @@ impl<const MIRROR: bool> WithSimd for Arrive<'_, MIRROR> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) -> Arrived {
-        let Self { of, longest } = self;
         let mut arrived = Arrived { vectors: [[[0.0; LANES]; 3]; 7], usual: [0.0; LANES] };
         for lane in 0..LANES {
-            let v = vector(&of.vectors[0], lane);
-            let dp = [vector(&of.vectors[1], lane), vector(&of.vectors[2], lane)];
-            let dv = [vector(&of.vectors[3], lane), vector(&of.vectors[4], lane)];
-            let corners = [vector(&of.vectors[5], lane), vector(&of.vectors[6], lane), vector(&of.vectors[7], lane)];
-            let normals = [vector(&of.vectors[8], lane), vector(&of.vectors[9], lane), vector(&of.vectors[10], lane)];
-            let is_smooth = of.smooth[lane] > 0.0;
-            let weights = [of.weights[0][lane], of.weights[1][lane]];
-            let place = Place::new(corners, normals, is_smooth, weights);
-            let side = if place.outward.dot(v.as_dvec3()) < 0.0 { 1.0 } else { -1.0 };
-            let normal = (place.outward * side).as_vec3();
-            let (unit, n) = (renormalized(v), renormalized(normal));
-            let distance = f64::from(of.distance[lane]);
-            let dp = [
-                transfer(unit, n, distance, dp[0].as_dvec3(), dv[0].as_dvec3()),
-                transfer(unit, n, distance, dp[1].as_dvec3(), dv[1].as_dvec3()),
-            ];
-            let mut usual = is_within(dp[0], LONGEST) & is_within(dp[1], LONGEST);
-            let dp = [dp[0].as_vec3(), dp[1].as_vec3()];
-            // Half of it, as no column whose components are so short is longer.
-            usual &= is_within((dp[0] * 2.0).as_dvec3(), f64::from(longest[0]));
-            usual &= is_within((dp[1] * 2.0).as_dvec3(), f64::from(longest[0]));
-            usual &= is_within((dv[0] * 2.0).as_dvec3(), f64::from(longest[1]));
-            usual &= is_within((dv[1] * 2.0).as_dvec3(), f64::from(longest[1]));
-            set(&mut arrived.vectors[0], lane, place.position);
-            if !MIRROR {
-                let Encoded { footprint: [at, ab, ct, cb], direction, normal } = Encoded::new(v, normal, dp);
-                set(&mut arrived.vectors[1], lane, Vec3::new(at, ab, ct));
-                set(&mut arrived.vectors[2], lane, Vec3::new(cb, direction[0], direction[1]));
-                set(&mut arrived.vectors[3], lane, Vec3::new(normal[0], normal[1], 0.0));
-            } else {
+            let arriving = Arriving::of(self.of, lane);
+            let arrival = arriving.arrive(self.longest);
+            let Arrival { normal, dp, mut is_usual, .. } = arrival;
+            set(&mut arrived.vectors[0], lane, arrival.place.position);
+            if MIRROR {
+                let mirrored = arriving.mirror(&arrival);
+                is_usual &= mirrored.is_usual;
                 set(&mut arrived.vectors[1], lane, normal);
                 set(&mut arrived.vectors[2], lane, dp[0]);
                 set(&mut arrived.vectors[3], lane, dp[1]);
-                let shading = (place.shading * side).as_vec3();
-                let bent = renormalized(shading);
-                let w = unit - bent * (2.0 * unit.dot(bent));
-                let stays = w.dot(normal.as_dvec3()) > 0.0;
-                let turning = Turning::new(corners, normals, weights, shading);
-                let turned = [turning.over(dp[0]), turning.over(dp[1])];
-                usual &= !place.without_shading & (shading.dot(v) < 0.0) & stays;
-                usual &=
-                    !is_smooth | (turning.is_defined & is_within(turned[0], LONGEST) & is_within(turned[1], LONGEST));
-                let turns = |dn: glam::DVec3| {
-                    let dn = dn.as_vec3();
-                    let of = |x: f32| f64::from(if is_smooth { x } else { 0.0 });
-                    glam::DVec3::new(of(dn.x), of(dn.y), of(dn.z))
-                };
-                let dv = [
-                    reflect(unit, bent, turns(turned[0]), dv[0].as_dvec3()),
-                    reflect(unit, bent, turns(turned[1]), dv[1].as_dvec3()),
-                ];
-                usual &= is_within(dv[0], LONGEST) & is_within(dv[1], LONGEST);
-                set(&mut arrived.vectors[4], lane, w.normalize().as_vec3());
-                set(&mut arrived.vectors[5], lane, dv[0].as_vec3());
-                set(&mut arrived.vectors[6], lane, dv[1].as_vec3());
+                set(&mut arrived.vectors[4], lane, mirrored.direction);
+                set(&mut arrived.vectors[5], lane, mirrored.dv[0]);
+                set(&mut arrived.vectors[6], lane, mirrored.dv[1]);
+            } else {
+                let encoded = Encoded::new(arriving.direction, normal, dp);
+                let Encoded { footprint: [at, ab, ct, cb], direction, normal } = encoded;
+                set(&mut arrived.vectors[1], lane, Vec3::new(at, ab, ct));
+                set(&mut arrived.vectors[2], lane, Vec3::new(cb, direction[0], direction[1]));
+                set(&mut arrived.vectors[3], lane, Vec3::new(normal[0], normal[1], 0.0));
             }
-            arrived.usual[lane] = if usual { 1.0 } else { 0.0 };
+            arrived.usual[lane] = if is_usual { 1.0 } else { 0.0 };
         }
         arrived
     }
+}
+
+/// One photon that arrives.
+struct Arriving {
+    direction: Vec3,
+    dp: [Vec3; 2],
+    dv: [Vec3; 2],
+    corners: [Vec3; 3],
+    normals: [Vec3; 3],
+    is_smooth: bool,
+    weights: [f32; 2],
+    distance: f32,
+}
+
+/// Where it has arrived.
+struct Arrival {
+    place: Place,
+    /// 1 on the front side, -1 on the back.
+    side: f64,
+    normal: Vec3,
+    dp: [Vec3; 2],
+    is_usual: bool,
+}
+
+/// Where a mirror sends it.
+struct Mirrored {
+    direction: Vec3,
+    dv: [Vec3; 2],
+    is_usual: bool,
+}
+
+impl Arriving {
+    #[inline(always)]
+    fn of(of: &Arrivals, lane: usize) -> Self {
+        let Arrivals { vectors: v, distance, weights, smooth, .. } = of;
+        Self {
+            direction: vector(&v[0], lane),
+            dp: [vector(&v[1], lane), vector(&v[2], lane)],
+            dv: [vector(&v[3], lane), vector(&v[4], lane)],
+            corners: [vector(&v[5], lane), vector(&v[6], lane), vector(&v[7], lane)],
+            normals: [vector(&v[8], lane), vector(&v[9], lane), vector(&v[10], lane)],
+            is_smooth: smooth[lane] > 0.0,
+            weights: [weights[0][lane], weights[1][lane]],
+            distance: distance[lane],
+        }
+    }
+
+    /// As [`Surface::new`](crate::trace::Surface::new) and [`Differential::transfer`] have it.
+    #[inline(always)]
+    fn arrive(&self, longest: [f32; 2]) -> Arrival {
+        let place = Place::new(self.corners, self.normals, self.is_smooth, self.weights);
+        let side = if place.outward.dot(self.direction.as_dvec3()) < 0.0 { 1.0 } else { -1.0 };
+        let normal = (place.outward * side).as_vec3();
+        let (v, n, s) = (renormalized(self.direction), renormalized(normal), f64::from(self.distance));
+        let a = transfer(v, n, s, self.dp[0].as_dvec3(), self.dv[0].as_dvec3());
+        let b = transfer(v, n, s, self.dp[1].as_dvec3(), self.dv[1].as_dvec3());
+        let dp = [a.as_vec3(), b.as_vec3()];
+        let is_usual = is_within(a, LONGEST)
+            & is_within(b, LONGEST)
+            & is_short(dp[0], longest[0])
+            & is_short(dp[1], longest[0])
+            & is_short(self.dv[0], longest[1])
+            & is_short(self.dv[1], longest[1]);
+        Arrival { place, side, normal, dp, is_usual }
+    }
+
+    /// As [`reflected`](crate::trace::scatter::reflected) has it.
+    #[inline(always)]
+    fn mirror(&self, arrival: &Arrival) -> Mirrored {
+        let Arrival { place, normal, dp, .. } = arrival;
+        let shading = (place.shading * arrival.side).as_vec3();
+        let (v, n) = (renormalized(self.direction), renormalized(shading));
+        let w = v - n * (2.0 * v.dot(n));
+        let turning = Turning::new(self.corners, self.normals, self.weights, shading);
+        let (na, nb) = (turning.over(dp[0]), turning.over(dp[1]));
+        let is_defined = turning.is_defined & is_within(na, LONGEST) & is_within(nb, LONGEST);
+        let a = reflect(v, n, self.turn(na), self.dv[0].as_dvec3());
+        let b = reflect(v, n, self.turn(nb), self.dv[1].as_dvec3());
+        let is_usual = !place.without_shading
+            & (shading.dot(self.direction) < 0.0)
+            & (w.dot(normal.as_dvec3()) > 0.0)
+            & (!self.is_smooth | is_defined)
+            & is_within(a, LONGEST)
+            & is_within(b, LONGEST);
+        Mirrored { direction: w.normalize().as_vec3(), dv: [a.as_vec3(), b.as_vec3()], is_usual }
+    }
+
+    /// The change of the normal that `turned` is of a smooth triangle, as it is stored; none of a flat one.
+    #[inline(always)]
+    fn turn(&self, turned: DVec3) -> DVec3 {
+        choose(self.is_smooth, turned.as_vec3().as_dvec3(), DVec3::ZERO)
+    }
+}
+
+/// Whether a column is so short that [`Differential::bound`] leaves it without a look at its length.
+#[inline(always)]
+fn is_short(c: Vec3, longest: f32) -> bool {
+    is_within((c * 2.0).as_dvec3(), f64::from(longest))
 }

@@ -5,7 +5,7 @@
 //! edge that two triangles share has one function, so that no ray passes between them.
 
 use crate::scene::{Camera, Geometry};
-use crate::trace::intersector::sphere;
+use crate::trace::sphere::sphere;
 use crate::trace::{Hit, Ray};
 use glam::DVec3;
 use rayon::prelude::*;

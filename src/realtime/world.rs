@@ -223,7 +223,7 @@ impl Part {
         let mut best = Hit { t: f32::INFINITY, primitive: u32::MAX, weights: [0.0; 2] };
         for &p in &self.primitives {
             let met = match g.spheres.get((p as usize).wrapping_sub(g.triangles.len())) {
-                Some(s) => crate::trace::intersector::sphere(ray, s.center, s.radius, best.t).map(|t| (t, 0.0, 0.0)),
+                Some(s) => crate::trace::sphere::sphere(ray, s.center, s.radius, best.t).map(|t| (t, 0.0, 0.0)),
                 None => sheared.intersect(&g.corners(p as usize), best.t),
             };
             if let Some((t, b, c)) = met

@@ -44,18 +44,18 @@ impl Intersector {
             let [.., along] = axes_of(scaled.direction);
             let Waiting { packet, numbers } = &mut waiting[(x << 2 | y << 1 | z) * 3 + along];
             numbers[packet.push(&scaled)] = number as u32;
-            if packet.len() == PACKET {
+            if packet.ray_count() == PACKET {
                 let own = self.closest_of_packet(packet, numbers, hits);
                 visits = Visits { nodes: visits.nodes + own.nodes, by_rays: visits.by_rays + own.by_rays };
                 packet.clear();
             }
         }
         for Waiting { packet, numbers } in &waiting {
-            if packet.len() >= FEW {
+            if packet.ray_count() >= FEW {
                 self.closest_of_packet(packet, numbers, hits);
                 continue;
             }
-            for &number in &numbers[..packet.len()] {
+            for &number in &numbers[..packet.ray_count()] {
                 hits[number as usize] = self.closest(&rays[number as usize]);
             }
         }
@@ -71,7 +71,7 @@ impl Intersector {
             weights: [[0.0; 2]; PACKET],
         };
         let visits = traverse_packet(&self.bvh.nodes, packet, &mut closest);
-        for (lane, &number) in numbers[..packet.len()].iter().enumerate() {
+        for (lane, &number) in numbers[..packet.ray_count()].iter().enumerate() {
             hits[number as usize] = self.hit(closest.leaves[lane], closest.t[lane], closest.weights[lane]);
         }
         visits

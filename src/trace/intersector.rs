@@ -5,6 +5,7 @@ use crate::scene::Geometry;
 use crate::trace::builder::{SOME_RAYS, build_parameters};
 use crate::trace::interleaved::traverse_interleaved;
 use crate::trace::packet::inverse_of;
+use crate::trace::sphere::sphere;
 use crate::trace::traversal::{BoxRay, LeafTest, is_large, traverse};
 use crate::trace::triangle::ShearedRay;
 use glam::{Vec3, Vec3A};
@@ -291,13 +292,13 @@ impl<'a> Closest<'a> {
 impl LeafTest for Closest<'_> {
     #[inline(always)]
     fn test(&mut self, leaf: usize, limit: &mut f32) -> bool {
-        if let Some((t, b, c)) = self.on.leaf(&self.ray, &self.sheared, leaf, self.t) {
-            if t < self.t || self.on.is_before(leaf, self.leaf) {
-                (self.t, self.leaf, self.weights) = (t, leaf, [b, c]);
-                *limit = self.start.before(t);
-                // It is looked up in the end.
-                prefetch_index(&self.on.primitives, leaf);
-            }
+        if let Some((t, b, c)) = self.on.leaf(&self.ray, &self.sheared, leaf, self.t)
+            && (t < self.t || self.on.is_before(leaf, self.leaf))
+        {
+            (self.t, self.leaf, self.weights) = (t, leaf, [b, c]);
+            *limit = self.start.before(t);
+            // It is looked up in the end.
+            prefetch_index(&self.on.primitives, leaf);
         }
         false
     }
@@ -329,24 +330,6 @@ impl LeafTest for Any<'_> {
     fn prefetch(&self, leaf: usize) {
         self.on.prefetch(leaf);
     }
-}
-
-/// Distance to a sphere from outside or inside, in `(0, t_max]`; f64, because the discriminant cancels.
-pub fn sphere(ray: &Ray, center: Vec3, radius: f32, t_max: f32) -> Option<f32> {
-    let d = ray.direction.as_dvec3();
-    let o = ray.origin.as_dvec3() - center.as_dvec3();
-    let a = d.length_squared();
-    let b = o.dot(d);
-    // |o - (o·d)d|² against r² keeps its digits for far origins.
-    let off = (o - d * (b / a)).length_squared();
-    let rest = f64::from(radius).powi(2) - off;
-    if rest < 0.0 {
-        return None;
-    }
-    let half = (rest / a).sqrt();
-    let (near, far) = ((-b / a - half) as f32, (-b / a + half) as f32);
-    let t = if near > 0.0 { near } else { far };
-    (t > 0.0 && t <= t_max).then_some(t)
 }
 
 #[cfg(test)]

@@ -8,6 +8,7 @@ mod interleaved;
 pub mod intersector;
 pub mod packet;
 pub mod scatter;
+pub mod sphere;
 pub mod surface;
 pub mod traversal;
 pub mod triangle;

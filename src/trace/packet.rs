@@ -45,7 +45,7 @@ impl Packet {
 
     /// Number of rays.
     #[inline(always)]
-    pub fn len(&self) -> usize {
+    pub fn ray_count(&self) -> usize {
         self.count
     }
 
@@ -142,9 +142,9 @@ impl<T: PacketTest> EightLanes for PacketTraversal<'_, T> {
             }
             let mut met = met_by(simd, node, packet, &inverse, &limits);
             let mut by_any = 0;
-            for slot in 0..8 {
-                met[slot] &= own;
-                by_any |= u32::from(met[slot] != 0) << slot;
+            for (slot, met) in met.iter_mut().enumerate() {
+                *met &= own;
+                by_any |= u32::from(*met != 0) << slot;
             }
             let mut children = 0;
             let mut inner = by_any & u32::from(node.imask);
