@@ -235,3 +235,78 @@ impl<S: Simd> BoxRays<S> {
         bits(simd, enters.at_most(leaves))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::frame::uniform_sphere;
+    use crate::math::sequence::{Sampling, Sequence};
+    use crate::trace::traversal::{BoxRay, boxes_met, octant_of};
+    use glam::Vec3A;
+    use obvhs::BvhBuildParams;
+    use obvhs::aabb::Aabb;
+    use obvhs::cwbvh::builder::build_cwbvh;
+    use std::time::Duration;
+
+    struct Met<'a>(&'a CwBvhNode, &'a Packet, &'a Row);
+
+    impl EightLanes for Met<'_> {
+        type Output = [u8; 8];
+
+        fn run<S: Simd>(self, simd: S) -> [u8; 8] {
+            met_by(simd, self.0, self.1, &self.1.inverse(), self.2)
+        }
+    }
+
+    /// In the widest instructions and in none each ray of a packet meets the boxes that it meets alone.
+    #[test]
+    fn rays_of_a_packet_meet_boxes_as_each_alone() {
+        let sequence = Sequence::new(Sampling::Random, 12);
+        let boxes: Vec<Aabb> = (0..500)
+            .map(|i| {
+                let (x, y) = (sequence.four(i, 0), sequence.four(i, 1));
+                let low = Vec3A::new(x[0], x[1], x[2]);
+                Aabb::new(low, low + 0.3 * Vec3A::new(y[0], y[1], y[2]))
+            })
+            .collect();
+        let bvh = build_cwbvh(&boxes, BvhBuildParams::medium_build(), &mut Duration::default());
+        let mut met = [0u32; 2];
+        for i in 0..2000u64 {
+            let octant = (i % 8) as u32;
+            let mut packet = Packet::new(octant);
+            let mut limits = [0.0; PACKET];
+            for (lane, limit) in limits.iter_mut().enumerate() {
+                let (x, y) = (sequence.four(i, 2 + lane as u32), sequence.four(i, 10 + lane as u32));
+                let sign = |bit: u32| if octant >> bit & 1 == 1 { 1.0 } else { -1.0 };
+                let mut direction = uniform_sphere(x[0], x[1]).normalize().abs() * Vec3::new(sign(2), sign(1), sign(0));
+                if lane == 3 && octant == 7 {
+                    direction.y = 0.0;
+                }
+                let origin = Vec3::new(x[2], x[3], y[0]) - direction * y[1];
+                packet.push(&Ray { origin, direction });
+                *limit = if lane % 2 == 0 { f32::INFINITY } else { y[2] };
+            }
+            let node = &bvh.nodes[i as usize % bvh.nodes.len()];
+            let together = dispatch_eight_lanes(Met(node, &packet, &limits));
+            assert_eq!(together, Met(node, &packet, &limits).run(pulp::Scalar));
+            for lane in 0..PACKET {
+                let ray = packet.ray(lane);
+                let start = BoxRay { origin: ray.origin, inverse: inverse_of(ray.direction) };
+                if octant_of(&start) != octant {
+                    continue;
+                }
+                let alone = boxes_met(node, &start, octant, limits[lane]);
+                for (slot, together) in together.iter().enumerate() {
+                    let meta = u32::from(node.child_meta[slot]);
+                    let bit = if meta & 0x18 == 0x18 { (meta ^ octant) & 31 } else { meta & 31 };
+                    let is_met = together >> lane & 1 == 1 && meta != 0;
+                    if meta != 0 {
+                        assert_eq!(is_met, alone >> bit & 1 == 1, "{i} {lane} {slot}");
+                        met[usize::from(is_met)] += 1;
+                    }
+                }
+            }
+        }
+        assert!(met.iter().all(|n| *n > 3000), "{met:?}");
+    }
+}
