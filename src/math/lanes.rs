@@ -87,6 +87,7 @@ pub fn bits_of_row<S: Simd>(simd: S, row: &[f32; 8]) -> u32 {
 
 /// Eight bytes as numbers.
 #[inline(always)]
+#[cfg_attr(not(target_arch = "x86_64"), expect(unused_variables, reason = "compilers for others do without help"))]
 pub fn of_bytes<S: Simd>(simd: S, bytes: &[u8; 8]) -> [f32; 8] {
     #[cfg(target_arch = "x86_64")]
     if let Some(v3) = (&simd as &dyn Any).downcast_ref::<pulp::x86::V3>() {

@@ -8,15 +8,13 @@
 mod curve;
 mod walk;
 
+pub(super) use crate::math::eights::LANES;
 use crate::math::lanes::dispatch_in_eights;
 pub(super) use curve::packing_order;
 use glam::Vec3;
 use rayon::prelude::*;
 use walk::{DEEPEST, Each};
 pub(super) use walk::{Visit, Walk};
-
-/// Boxes that are tested at once.
-pub(super) const LANES: usize = 8;
 
 /// Memory of one entry: its box, its share of the boxes above, and its place in the order.
 pub const BYTES_PER_ENTRY: usize = 28 + size_of::<u32>();
