@@ -289,13 +289,13 @@ mod tests {
             let node = &bvh.nodes[i as usize % bvh.nodes.len()];
             let together = dispatch_eight_lanes(Met(node, &packet, &limits));
             assert_eq!(together, Met(node, &packet, &limits).run(pulp::Scalar));
-            for lane in 0..PACKET {
+            for (lane, limit) in limits.into_iter().enumerate() {
                 let ray = packet.ray(lane);
                 let start = BoxRay { origin: ray.origin, inverse: inverse_of(ray.direction) };
                 if octant_of(&start) != octant {
                     continue;
                 }
-                let alone = boxes_met(node, &start, octant, limits[lane]);
+                let alone = boxes_met(node, &start, octant, limit);
                 for (slot, together) in together.iter().enumerate() {
                     let meta = u32::from(node.child_meta[slot]);
                     let bit = if meta & 0x18 == 0x18 { (meta ^ octant) & 31 } else { meta & 31 };
