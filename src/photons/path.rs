@@ -213,7 +213,7 @@ impl Flight<'_> {
         let numbers = || self.sequence.four(index, 1 + bounce);
         medium = medium_before(scene, medium, &surface);
         if let Some(inside) = attenuation(scene, medium, hit.t) {
-            match roulette(power, inside, numbers()[1]) {
+            match roulette(power, inside, || numbers()[1]) {
                 Some(kept) => power = kept,
                 None => return false,
             }
@@ -238,7 +238,7 @@ impl Flight<'_> {
                 }
                 let x = numbers();
                 let reflectance = material.diffuse_reflectance(surface.uv);
-                let Some(kept) = roulette(power, reflectance, x[0]) else {
+                let Some(kept) = roulette(power, reflectance, || x[0]) else {
                     return false;
                 };
                 power = kept;
@@ -335,14 +335,16 @@ pub fn attenuation(scene: &Scene, medium: Option<u32>, distance: f32) -> Option<
 }
 
 /// Share of `power` that `weight` lets through, by the mean of the channels.
-pub(super) fn share(power: Rgb, weight: Rgb) -> f32 {
+fn share(power: Rgb, weight: Rgb) -> f32 {
     let whole = mean(power);
     if whole > 0.0 { (mean(power * weight) / whole).clamp(0.0, 1.0) } else { 0.0 }
 }
 
-/// The power that survives `weight` for the number `x` in `[0, 1)`, its mean unchanged; None if it does not survive.
-fn roulette(power: Rgb, weight: Rgb, x: f32) -> Option<Rgb> {
+/// The power that survives `weight` for the number in `[0, 1)` that `x` makes, its mean unchanged; None if it does not survive.
+pub(super) fn roulette(power: Rgb, weight: Rgb, x: impl FnOnce() -> f32) -> Option<Rgb> {
     let q = share(power, weight);
+    // Below 1 is every number: what keeps all light asks for none.
+    let x = if q < 1.0 { x() } else { 0.0 };
     (x < q).then(|| power * weight / q)
 }
 
@@ -357,7 +359,7 @@ mod tests {
             p in prop::array::uniform3(0.01f32..10.0), w in prop::array::uniform3(0.0f32..1.0),
         ) {
             let (p, w) = (Rgb::from(p), Rgb::from(w));
-            if let Some(kept) = roulette(p, w, 0.0) {
+            if let Some(kept) = roulette(p, w, || 0.0) {
                 prop_assert!((mean(kept) / mean(p) - 1.0).abs() < 1e-5);
                 // What survives, times how often, is what the weight lets through.
                 prop_assert!((kept * share(p, w) - p * w).abs().max_element() < 1e-5 * mean(p));
@@ -367,8 +369,8 @@ mod tests {
 
     #[test]
     fn black_absorbs_and_white_keeps() {
-        assert!(roulette(Rgb::ONE, Rgb::ZERO, 0.0).is_none());
-        assert_eq!(roulette(Rgb::ONE, Rgb::ONE, 0.999_999), Some(Rgb::ONE));
-        assert!(roulette(Rgb::ZERO, Rgb::ONE, 0.0).is_none());
+        assert!(roulette(Rgb::ONE, Rgb::ZERO, || 0.0).is_none());
+        assert_eq!(roulette(Rgb::ONE, Rgb::ONE, || 0.999_999), Some(Rgb::ONE));
+        assert!(roulette(Rgb::ZERO, Rgb::ONE, || 0.0).is_none());
     }
 }

@@ -3,10 +3,10 @@
 
 use crate::math::rgb::Rgb;
 use crate::photons::arrivals::Arrivals;
-use crate::photons::path::{Flight, MAX_ANGLE, PathCounts, PathState, Unrecorded, share};
+use crate::photons::path::{Flight, MAX_ANGLE, PathCounts, PathState, Unrecorded, roulette};
 use crate::photons::{Photon, PhotonKind, StoredPhoton, StoredPhotons};
 use crate::scene::Material;
-use crate::trace::surface::SELF_INTERSECTION;
+use crate::trace::surface::beside;
 use crate::trace::{Hit, Ray};
 
 /// Photons that are followed together, and what that takes; kept between wavefronts.
@@ -132,7 +132,6 @@ impl Wavefront {
         }
         let Flight { scene, sequence, .. } = step.flight;
         let arrived = self.mirrored.arrive::<true>([scene.radius, MAX_ANGLE]);
-        let offset = scene.radius * SELF_INTERSECTION;
         for lane in 0..self.mirrored.len() {
             let number = self.mirrored.number(lane);
             let Some(hit) = self.hits[number] else { continue };
@@ -143,12 +142,11 @@ impl Wavefront {
                 continue;
             }
             let photon = &mut self.photons[number];
-            let q = share(photon.power, *reflectance);
-            // Below 1 is every number: what reflects all light asks for none.
-            let x = if q < 1.0 { sequence.four(photon.index, 1 + step.bounce)[0] } else { 0.0 };
-            self.goes_on[number] = x < q;
-            photon.power = photon.power * *reflectance / q;
-            let origin = arrived.position(lane) + arrived.normal(lane) * offset;
+            let x = || sequence.four(photon.index, 1 + step.bounce)[0];
+            let Some(kept) = roulette(photon.power, *reflectance, x) else { continue };
+            self.goes_on[number] = true;
+            photon.power = kept;
+            let origin = beside(scene, arrived.position(lane), arrived.normal(lane), true);
             photon.ray = Ray { origin, direction: arrived.direction(lane) };
             photon.differential = arrived.differential(lane);
             if photon.kind == PhotonKind::Direct {

@@ -2,6 +2,7 @@
 
 use super::intersector::{FAR, Hit, Intersector, Ray};
 use super::packet::{PACKET, Packet, PacketTest, Visits, traverse_packet};
+use super::traversal::octant_of;
 use super::triangle::{ShearedRays, axes_of};
 use crate::math::eights::Row;
 use pulp::Simd;
@@ -40,9 +41,8 @@ impl Intersector {
                 hits[number] = self.closest(ray);
                 continue;
             }
-            let [x, y, z] = scaled.direction.to_array().map(|c| usize::from(c >= 0.0));
             let [.., along] = axes_of(scaled.direction);
-            let Waiting { packet, numbers } = &mut waiting[(x << 2 | y << 1 | z) * 3 + along];
+            let Waiting { packet, numbers } = &mut waiting[octant_of(scaled.direction) as usize * 3 + along];
             numbers[packet.push(&scaled)] = number as u32;
             if packet.ray_count() == PACKET {
                 let own = self.closest_of_packet(packet, numbers, hits);

@@ -73,7 +73,15 @@ struct TraversalState<T> {
 impl<T: LeafTest> TraversalState<T> {
     #[inline(always)]
     fn new((ray, limit, test): (BoxRay, f32, T)) -> Self {
-        Self { ray, octant: octant_of(&ray), limit, test, stack: Stack::new(), group: Group::ROOT, primitives: (0, 0) }
+        Self {
+            ray,
+            octant: octant_of(ray.inverse),
+            limit,
+            test,
+            stack: Stack::new(),
+            group: Group::ROOT,
+            primitives: (0, 0),
+        }
     }
 
     /// Tests the entries of the last node and goes on to the next; false at the end.

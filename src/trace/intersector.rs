@@ -180,7 +180,9 @@ impl Intersector {
 
     #[inline(always)]
     fn start(&self, ray: &Ray, t_max: f32) -> Option<Start> {
-        if !self.is_sound(ray) || t_max <= 0.0 {
+        // Not before a distance that is no number, either.
+        let is_ahead = t_max > 0.0;
+        if !is_ahead || !self.is_sound(ray) {
             return None;
         }
         let (mut origin, mut moved) = (ray.origin, 0.0);

@@ -292,7 +292,7 @@ mod tests {
             for (lane, limit) in limits.into_iter().enumerate() {
                 let ray = packet.ray(lane);
                 let start = BoxRay { origin: ray.origin, inverse: inverse_of(ray.direction) };
-                if octant_of(&start) != octant {
+                if octant_of(ray.direction) != octant {
                     continue;
                 }
                 let alone = boxes_met(node, &start, octant, limit);

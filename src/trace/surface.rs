@@ -96,8 +96,7 @@ impl Surface {
     ///
     /// For a ray that is known to stay on that side, although rounding may have turned it to the other.
     pub fn beside(&self, scene: &Scene, before: bool) -> Vec3 {
-        let offset = scene.radius * SELF_INTERSECTION;
-        if before { self.position + self.normal * offset } else { self.position - self.normal * offset }
+        beside(scene, self.position, self.normal, before)
     }
 }
 
@@ -168,6 +167,13 @@ impl Turning {
         let dn = self.along[0] * db + self.along[1] * dc;
         (dn - self.unit * self.unit.dot(dn)) * self.per_length
     }
+}
+
+/// [`Surface::beside`] of a position and a unit normal.
+#[inline(always)]
+pub(crate) fn beside(scene: &Scene, position: Vec3, normal: Vec3, before: bool) -> Vec3 {
+    let offset = scene.radius * SELF_INTERSECTION;
+    if before { position + normal * offset } else { position - normal * offset }
 }
 
 /// Texture coordinates at a place of a triangle; zero where it has none.

@@ -142,10 +142,10 @@ impl<G: Copy + Default> Stack<G> {
     }
 }
 
-/// The octant that a ray goes to, three bits.
+/// The octant that a ray goes to by its direction, or by one over that: three bits.
 #[inline(always)]
-pub(super) fn octant_of(ray: &BoxRay) -> u32 {
-    let [x, y, z] = ray.inverse.to_array().map(|c| u32::from(c >= 0.0));
+pub(super) fn octant_of(direction: Vec3) -> u32 {
+    let [x, y, z] = direction.to_array().map(|c| u32::from(c >= 0.0));
     x << 2 | y << 1 | z
 }
 
@@ -155,7 +155,7 @@ impl<T: LeafTest, const AHEAD: bool> WithSimd for Traversal<'_, T, AHEAD> {
     #[inline(always)]
     fn with_simd<I: Simd>(self, _: I) {
         let Self { nodes, ray, mut limit, test } = self;
-        let octant = octant_of(ray);
+        let octant = octant_of(ray.inverse);
         let mut stack = Stack::new();
         let mut group = Group::ROOT;
         loop {
